@@ -4,8 +4,12 @@ from pathlib import Path
 
 import pytest
 from terminal import press, screen_text, with_editor
+from textual.widgets import OptionList
 
+from tui.screens.ask import ChooseDialog
+from tui.screens.context_forms import OpenDialog
 from tui.screens.remarks import RemarksDialog
+from tui.widgets.line_list import LineList
 
 REMARKS = [f"column {n} is of another type than its condition" for n in range(1, 31)]
 
@@ -33,6 +37,35 @@ def test_remarks_are_scrolled_through_to_the_last_and_left_with_escape(path):
     assert REMARKS[-1] not in first
     assert f"· {REMARKS[-1]}" in last
     assert not is_open
+
+
+@pytest.mark.parametrize("of", ["choices", "columns", "files"])
+def test_home_and_end_go_through_a_list_as_long_as_nothing_is_typed_over_it(path, of):
+    for n in range(30):
+        (path.parent / f"table{n:02}.csv").write_text("Asset\nwalk\n")
+    (path.parent / "contextdb.toml").write_text("".join(f'[conditions.other{n}]\ntype = "bool"\n' for n in range(30)))
+
+    async def script(app, pilot):
+        if of == "choices":
+            app.push_screen(ChooseDialog("Choose", [f"line {n}" for n in range(30)]))
+        elif of == "columns":
+            await press(pilot, "alt+c")
+        else:
+            app.push_screen(OpenDialog(path.parent))
+        await press(pilot)
+        listed = app.screen.query_one(LineList if of == "files" else OptionList)
+        at = lambda: listed.index if of == "files" else listed.highlighted  # noqa: E731
+        n_lines = listed.n_lines if of == "files" else listed.option_count
+        places = [at()]
+        for key in ("end", "home", "end"):
+            await press(pilot, key)
+            places.append(at())
+        await press(pilot, "e", "home")
+        return places, n_lines, app.focused.cursor_position, app.focused.value
+
+    places, n_lines, in_text, text = with_editor(path, script)
+    assert places == [0, n_lines - 1, 0, n_lines - 1]
+    assert (in_text, text) == (0, "e")
 
 
 def look_of(app, label: str) -> tuple[str, str, bool | None]:

@@ -26,6 +26,7 @@ from ..model.column_choices import JOB_NAMES, JOB_WORDS, Choice, Insertion, NewC
 from ..model.condition_form import ConditionForm
 from ..model.layout import cut_middle
 from ..widgets.field import Field
+from ..widgets.list_filter import ListFilter
 from ..widgets.pick import Pick
 from .dialog import Dialog
 
@@ -38,6 +39,8 @@ class AddColumn(Dialog[Insertion]):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("up", "highlight(-1)", "Up", show=False),
         Binding("down", "highlight(1)", "Down", show=False),
+        Binding("home", "end_of_list(False)", "First", show=False),
+        Binding("end", "end_of_list(True)", "Last", show=False),
         Binding("f6", "insert", "Insert", show=False, priority=True),
     ]
 
@@ -72,7 +75,9 @@ class AddColumn(Dialog[Insertion]):
     def compose_body(self) -> ComposeResult:
         """What there is, and the form of a new column."""
         yield Field(
-            "Name", Input(compact=True, id="column-name", placeholder="type to filter, or the name of a new column"), key="name"
+            "Name",
+            ListFilter(compact=True, id="column-name", placeholder="type to filter, or the name of a new column"),
+            key="name",
         )
         yield OptionList(id="column-list", compact=True)
         yield Static(id="column-about")
@@ -138,6 +143,12 @@ class AddColumn(Dialog[Insertion]):
         elif listed.option_count:
             listed.highlighted = ((listed.highlighted or 0) + down) % listed.option_count
             self._show_form()
+
+    def action_end_of_list(self, is_last: bool) -> None:
+        """Go to the first or the last line of the list."""
+        listed = self.query_one("#column-list", OptionList)
+        if listed.option_count:
+            listed.highlighted = listed.option_count - 1 if is_last else 0
 
     # ---- the form
 

@@ -11,7 +11,8 @@ from textual.binding import Binding, BindingType
 from textual.widgets import Input, OptionList, Static
 from textual.widgets.option_list import Option
 
-from ..widgets.cursor_lines import UP_DOWN
+from ..widgets.cursor_lines import FIRST_LAST, UP_DOWN
+from ..widgets.list_filter import ListFilter
 from .dialog import Answer, Dialog, buttons
 
 
@@ -57,6 +58,7 @@ class ChooseDialog(Dialog[int]):
     """
     BINDINGS: ClassVar[list[BindingType]] = [
         *UP_DOWN,
+        *FIRST_LAST,
         Binding("pageup", "move(-10)", "Page up", show=False),
         Binding("pagedown", "move(10)", "Page down", show=False),
     ]
@@ -72,7 +74,7 @@ class ChooseDialog(Dialog[int]):
     def compose_body(self) -> ComposeResult:
         if self._about:
             yield Static(Text(f"{self._about}\n"))
-        yield Input(compact=True, placeholder="type to filter")
+        yield ListFilter(compact=True, placeholder="type to filter")
         yield OptionList()
 
     def on_mount(self) -> None:

@@ -19,7 +19,7 @@ from contextdb.errors import ContextDBError
 
 from ..model.context_list import ContextList, expectation_fault, summary
 from ..model.paths import resolved
-from ..widgets.cursor_lines import UP_DOWN
+from ..widgets.cursor_lines import FIRST_LAST, UP_DOWN
 from ..widgets.field import Field
 from .dialog import Dialog
 from .path_dialog import PathDialog
@@ -147,6 +147,7 @@ class OpenDialog(PathDialog[Path]):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("tab", "complete", "Complete", priority=True),
         *UP_DOWN,
+        *FIRST_LAST,
         Binding("pagedown", "move(8)", "Page down", show=False),
         Binding("pageup", "move(-8)", "Page up", show=False),
     ]

@@ -21,8 +21,9 @@ from contextdb.tables.table import Table
 from ..model.find import Search, find
 from ..model.layout import cut_middle
 from ..model.workspace import Workspace
-from ..widgets.cursor_lines import UP_DOWN
+from ..widgets.cursor_lines import FIRST_LAST, UP_DOWN
 from ..widgets.line_list import LineList, ListCell, ListColumn
+from ..widgets.list_filter import ListFilter
 from .dialog import Dialog
 
 MOST = 1000
@@ -44,6 +45,7 @@ class FindEverywhere(Dialog[FoundCell]):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         *UP_DOWN,
+        *FIRST_LAST,
         Binding("pagedown", "move(10)", "Page down", show=False),
         Binding("pageup", "move(-10)", "Page up", show=False),
     ]
@@ -68,7 +70,7 @@ class FindEverywhere(Dialog[FoundCell]):
 
     def compose_body(self) -> ComposeResult:
         """The text, its places, how many there are."""
-        yield Input(compact=True, placeholder="a text; upper and lower case are the same")
+        yield ListFilter(compact=True, placeholder="a text; upper and lower case are the same")
         columns = [
             ListColumn("Table", 14, is_name=True),
             ListColumn("Row", 5, 0, True),

@@ -10,6 +10,7 @@ from textual.widgets import Input
 
 from ..model.paths import common_start, completions, resolved
 from ..widgets.line_list import LineList, ListColumn
+from ..widgets.list_filter import ListFilter
 from .dialog import Answer, Dialog
 
 
@@ -29,7 +30,7 @@ class PathDialog(Dialog[Answer]):
 
     def path_entry(self, name: str, text: str = "") -> Input:
         """The line that the path is typed into."""
-        return Input(text, id=f"{name}-path", classes="path--entry", compact=True)
+        return ListFilter(text, id=f"{name}-path", classes="path--entry", compact=True)
 
     def path_names(self, name: str, empty: str) -> LineList:
         """The list of what the path may go on to be; the keys stay in the entry."""

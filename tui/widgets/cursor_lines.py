@@ -13,6 +13,12 @@ UP_DOWN: list[BindingType] = [
     Binding("up", "move(-1)", "Up", show=False),
     Binding("down", "move(1)", "Down", show=False),
 ]
+FAR = 10**9
+FIRST_LAST: list[BindingType] = [
+    Binding("home", f"move(-{FAR})", "First", show=False),
+    Binding("end", f"move({FAR})", "Last", show=False),
+]
+"""For lists under a `ListFilter`."""
 PAGES: list[BindingType] = [
     Binding("pageup", "page(-1)", "Page up", show=False),
     Binding("pagedown", "page(1)", "Page down", show=False),

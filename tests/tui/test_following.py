@@ -23,6 +23,7 @@ from textual.widgets import Static
 
 import contextdb as cdb
 from contextdb.cells.facts import Context
+from contextdb.cells.words import format_number
 from contextdb.cli import main
 from contextdb.telemetry.link.hearing import Wanted
 from tui.model.listening import Listening
@@ -115,6 +116,28 @@ def test_the_test_row_follows_a_game_and_marks_its_pick(path):
     assert "test row: game · player" in first
     assert "· 2 valid" in first.splitlines()[1]
     assert "· 1 valid" in second.splitlines()[1]
+
+
+def test_numbers_of_a_game_have_three_digits_as_it_goes_on_and_are_asked_whole(path):
+    compiled = cdb.load(path).compile()
+
+    def speed_of(screen: str) -> str:
+        return next(line for line in screen.splitlines() if line.lstrip().startswith("?")).split("│")[1].strip()
+
+    async def script(app, pilot):
+        with cdb.link("game") as link:
+            link.watch(compiled, "player")
+            seen = []
+            ask = lambda speed=0.54167881132: compiled.query({"speed": speed, "gait": "Walk", "tags": []})  # noqa: E731
+            await follow(app, pilot, ask)
+            for speed in (0.54167881132, 1.2140326691628, 1.2246467991473532e-16):
+                await until(pilot, lambda speed=speed: (ask(speed) and False) or shows(app, speed=format_number(speed)))
+                seen.append((speed_of(screen_text(app)), app.main.session.sheet.query.facts["speed"]))
+            return seen
+
+    seen = with_editor(path, script, (100, 24))
+    assert [text for text, _ in seen] == ["0.542", "1.21", "0"]
+    assert [fact for _, fact in seen] == [0.54167881132, 1.2140326691628, 1.2246467991473532e-16]
 
 
 def test_an_edit_that_is_not_saved_is_answered_beside_the_game(path):

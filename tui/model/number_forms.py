@@ -117,7 +117,7 @@ def _centre_of(piece: Piece, domain: Domain) -> str | None:
     return f"{domain.type.spelling.write(float(centre))}, {format_number(float(tolerance))}"
 
 
-_LONG = re.compile(r"-?\d+\.\d{4,}")
+_LONG = re.compile(r"-?\d+\.\d{4,}|-?\d(?:\.\d+)?e-\d+")
 ZERO = 1e-9
 
 

@@ -118,8 +118,11 @@ def test_a_suffix_in_capitals_is_a_clip_on_every_disk(folder):
 
 def test_no_clips_and_broken_clips_are_told(folder):
     config = MotionConfig.from_dict(SECTIONS, file="contextdb.toml")
-    with pytest.raises(MotionError, match=r'contextdb.toml: \[databases.jog_tired\] no file matches clips = "clips/\*_tired.bvh"'):
+    with pytest.raises(
+        MotionError, match=r'contextdb.toml: \[databases.jog_tired\] no file matches clips = "clips/\*_tired.bvh"'
+    ) as error:
         config.load_clips("jog_tired", folder / "clips")
+    assert "`contextdb demo --keep FOLDER` makes some" in str(error.value)
     (folder / "clips" / "broken.bvh").write_text("HIERARCHY")
     with pytest.raises(ClipError, match=r"broken\.bvh, line 1"):
         build(config, folder, cache=None)

@@ -120,3 +120,24 @@ def test_a_row_that_is_typed_while_rows_are_filtered_is_shown(path):
         return [sheet.text(row, 0) for row in range(len(sheet.view))], said(app)
 
     assert with_editor(path, script)[0] == ["walk", "jog"]
+
+
+@pytest.mark.parametrize(
+    ("size", "name"), [((80, 24), "Land_Grass_…rward_03_v2"), ((120, 36), "Land_Grass_Soft_Roll_Forward_03_v2")]
+)
+def test_the_only_row_of_a_wide_table_is_told_by_its_name_and_a_header_takes_no_room_from_it(tmp_path, size, name):
+    columns = [
+        "weight",
+        "cooldown_s",
+        *(f"{what}_{of}" for what in ("gait", "speed", "ground") for of in ("own", "target", "next")),
+    ]
+    path = tmp_path / "wide.csv"
+    path.write_text(f"Asset,{','.join(columns)}\nLand_Grass_Soft_Roll_Forward_03_v2,1,2.5{',Any' * 9}\n")
+
+    async def script(app, pilot):
+        return screen_text(app).splitlines()
+
+    lines = with_editor(path, script, size)
+    row = next(line for line in lines if line.startswith("1 "))
+    assert name in row
+    assert len(row.split("│")[2]) <= len(" cooldown_s")

@@ -1,16 +1,26 @@
 """What dialogs share: one kind of button, a title and keys in the frame, and room for what is longer than the screen."""
 
+import importlib
+import pkgutil
+import re
+from collections.abc import Iterator
+from itertools import takewhile
 from pathlib import Path
+from typing import Any
 
 import pytest
 from terminal import press, screen_text, with_editor
+from textual.binding import Binding
 from textual.widgets import OptionList
 
+from tui import screens
 from tui.screens.ask import ChooseDialog
 from tui.screens.context_forms import OpenDialog
+from tui.screens.dialog import Dialog
 from tui.screens.remarks import RemarksDialog
 from tui.widgets.line_list import LineList
 
+KEY = re.compile(r"F\d+|Del|[A-Z]")
 REMARKS = [f"column {n} is of another type than its condition" for n in range(1, 31)]
 
 
@@ -96,3 +106,21 @@ def test_the_palette_has_the_title_and_the_keys_of_a_dialog(path):
     text = with_editor(path, script)
     assert "╭─ Commands ─" in text
     assert "↑↓ choose · Enter OK · Esc cancel ─╯" in text
+
+
+def dialogs(of: type = Dialog) -> Iterator[type[Dialog[Any]]]:
+    for each in of.__subclasses__():
+        yield each
+        yield from dialogs(each)
+
+
+for module in pkgutil.iter_modules(screens.__path__):
+    importlib.import_module(f"tui.screens.{module.name}")
+
+
+@pytest.mark.parametrize("dialog", [each for each in dict.fromkeys(dialogs()) if each.__module__.startswith("tui.")])
+def test_the_keys_that_the_frame_names_are_bound(dialog: type[Dialog[Any]]):
+    named = {word for part in dialog.keys_text.split(" · ") for word in takewhile(KEY.fullmatch, part.split())}
+    bindings = [each for parent in dialog.__mro__ for each in vars(parent).get("BINDINGS", ())]
+    bound = {key.strip() for each in bindings for key in (each.key if isinstance(each, Binding) else each[0]).split(",")}
+    assert {word.lower().replace("del", "delete") for word in named} <= bound

@@ -30,7 +30,7 @@ MARKS = (
     ("▸", "the row refers to another table: Alt+O opens it"),
     ("×2", "the row is not valid: two cells fail"),
     ("«  »", "cells that fail, outside the window"),
-    ("leaves 7  → 7", "how many rows the fact of this column leaves"),
+    ("7 left", "how many rows the fact of this column leaves"),
     ("33 %", "the chance that the row is picked"),
     ("!", "this cell cannot be read"),
     ("–", "the row is disabled"),

@@ -21,6 +21,7 @@ from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.selection.decision import Action
 from contextdb.motion.trace.status import Status
 
+from ..model.number_forms import three_digits
 from . import reasons
 from .bars import Bars
 from .channels import Channels, Dial
@@ -241,7 +242,9 @@ class MomentScreen(Screen[None]):
 
     def _facts(self, moment: Moment) -> str:
         """The facts of the game at the moment, behind the speeds where these have no line of their own."""
-        facts = ", ".join(f"{name} {reasons.fact_text(value)}" for name, value in sorted((moment.decision.context or {}).items()))
+        facts = ", ".join(
+            f"{name} {three_digits(reasons.fact_text(value))}" for name, value in sorted((moment.decision.context or {}).items())
+        )
         speed = self._status[0][1] if self._is_small and self._status and self._status[0][0] == "m/s" else ""
         return printable(" · ".join(filter(None, (f"m/s {speed}" if speed else "", facts))))
 
@@ -320,9 +323,10 @@ class MomentScreen(Screen[None]):
         else:
             lines = reasons.reason_lines(self.recording, moment, row)
         if self._is_small:
+            widest = max(len(name) for name, _ in self._status)
             lines += [
                 reasons.Line("how it stands", "head"),
-                *(reasons.Line(f"    {name}  {state}") for name, state in self._status),
+                *(reasons.Line(f"    {name:<{widest}}  {state}") for name, state in self._status),
             ]
         text = Content.assemble(*((f"{printable(line.text)}\n", STYLES[line.kind]) for line in lines))
         self.query_one("#reasons", Static).update(text)

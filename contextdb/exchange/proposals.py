@@ -175,14 +175,17 @@ def as_numbers(column: TextColumn, is_measure: bool = True) -> TextColumn | None
 
 
 def as_lists(column: TextColumn) -> TextColumn | None:
-    """A column of lists of names as cells of ours: "Low / Mid" as Low Mid. None where the parts do not come back in other texts."""
+    """A column of lists of names as cells of ours: "Low / Mid" as Low Mid. None where the parts do not come back in other texts; of
+    lists with semicolons, which no name has, it is enough that one does."""
     parts = {text: _BETWEEN_NAMES.split(text.strip()) for text in column.texts if not says_any(text)}
     n_times = Counter(part for each in parts.values() for part in set(each))
     alone = {each[0] for each in parts.values() if len(each) == 1}
     lists = [each for each in parts.values() if len(each) > 1]
-    if not lists or not all((part in alone or n_times[part] > 1) and _is_short(part) for each in lists for part in each):
+    names = {part for each in lists for part in each}
+    is_sure = all(len(text.split(";")) == len(each) for text, each in parts.items())
+    if not all((is_sure or part in alone or n_times[part] > 1) and _is_short(part) for part in names):
         return None
-    if not any(part in alone for each in lists for part in each):
+    if not names & alone:
         return None
     texts = [" ".join(map(quoted, parts[text])) if text in parts else text for text in column.texts]
     return TextColumn.of(column.name, (texts[code] for code in column.codes.tolist()))

@@ -34,7 +34,7 @@ from contextdb.files.toml_shapes import Path as KeyPath
 from contextdb.motion.characters.facts import UNITS
 from contextdb.motion.clips.clip import Up
 from contextdb.motion.clips.doubts import doubts, grouped
-from contextdb.motion.preparing.cells_of_clips import ANY, CONDITIONS, OUTPUTS, SOFT, softened
+from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS, SOFT, softened
 from contextdb.motion.preparing.describing import (
     Described,
     by_rig,
@@ -294,7 +294,7 @@ def filling(table: Table, rows: Sequence[Described]) -> Filling:
                 empty.append(each)
             elif not _accepts(table, name, text, known[asset]):
                 differences.append(each)
-            elif cell.endswith(SOFT.get(name, ANY)) and _excludes(table, name, text):
+            elif name in SOFT and cell.endswith(SOFT[name]) and _excludes(table, name, text):
                 differences.append(replace(each, clip=softened(text, name)))
     added = [row for row in rows if row.asset not in set(assets)]
     cells = {row.asset: row.cells for row in rows}

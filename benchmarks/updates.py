@@ -153,7 +153,7 @@ def rounds_of(first: Any, n: int) -> Iterator[tuple[float, str]]:
     crowd = motion.Crowd(first.copy() for _ in range(n))
     ways = np.arange(n) % 61 / 10.0
     speeds = 0.8 + np.arange(n) % 29 / 10.0
-    facts = {"gait": ["Run" if speed > 2.0 else "Walk" for speed in speeds], "armed": False}
+    facts: dict[str, Any] = {"gait": ["Run" if speed > 2.0 else "Walk" for speed in speeds], "armed": False}
     one = {"gait": facts["gait"][0], "armed": False}
     tick = 0
     while True:
@@ -167,7 +167,7 @@ def rounds_of(first: Any, n: int) -> Iterator[tuple[float, str]]:
             given = [crowd[0].update(1.0 / RATE, stick, one)] if n == 1 else crowd.update(1.0 / RATE, sticks, facts)
             took += time.process_time() - began
         played = [each.decision.playing for each in given]
-        roots = math.fsum(each.pose.root[0] for each in given)
+        roots = math.fsum(each.pose.root[0] for each in given if each.pose is not None)
         digest = f"{sum(0 if each is None else each.frame for each in played)}|{roots!r}"
         yield took / 10 / n * 1e6, digest
 

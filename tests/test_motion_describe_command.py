@@ -80,6 +80,26 @@ def test_a_written_table_checks_builds_and_drives(game: Path):
     assert session["frames_used_share"] > 0.0
 
 
+def test_soft_columns_exclude_no_clip_and_cost(game: Path):
+    describe("game/clips", "--out", "game/moves.csv")
+    hard = rows(game / "moves.csv")
+    told = describe("game", "--into", "game/moves.csv", "--soft", "turn", code=1).out
+    assert "start_walk, turn: the cell is -55..55, it would be -55..55 ~0.5/30" in told
+    assert rows(game / "moves.csv") == hard
+    describe("game", "--into", "game/moves.csv", "--soft", "turn", "--update")
+    soft = rows(game / "moves.csv")
+    at = COLUMNS.index("turn")
+    assert [row[at] for row in soft[1:]] == [row[at] if row[at] == "Any" else f"{row[at]} ~0.5/30" for row in hard[1:]]
+    assert [row[:at] + row[at + 1 :] for row in soft] == [row[:at] + row[at + 1 :] for row in hard]
+    assert "0 cells filled" in describe("game", "--into", "game/moves.csv", "--soft", "turn").out
+    described = csv.reader(describe("game/clips", "--soft", "turn").lines)
+    assert [row[at] for row in described] == [row[at] for row in soft]
+    asked = run(
+        "query", "game/moves.csv", "gait=Walk", "speed=1.3", "direction=0", "turn=70", "style=normal", "--json", "--unknown", "any"
+    )
+    assert "start_walk" in [match["asset"] for match in asked.json["matches"]], asked.json
+
+
 def test_conditions_that_are_declared_stay(game: Path):
     toml = '[conditions.speed]\ntype = "number"\nmax = 50.0 # ours\n'
     (game / "contextdb.toml").write_text(toml, encoding="utf-8")

@@ -20,6 +20,7 @@ from contextdb.cells.conditions import Condition
 from contextdb.cells.grammar import parse_cell
 from contextdb.cells.kinds import Family
 from contextdb.cells.output_types import OutputType
+from contextdb.cells.sets import Cell
 from contextdb.columns import TextColumn
 from contextdb.disk import read_bytes
 from contextdb.disk.boundary import inside
@@ -33,7 +34,7 @@ from contextdb.files.toml_shapes import Path as KeyPath
 from contextdb.motion.characters.facts import UNITS
 from contextdb.motion.clips.clip import Up
 from contextdb.motion.clips.doubts import doubts, grouped
-from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS
+from contextdb.motion.preparing.cells_of_clips import CONDITIONS, OUTPUTS, SOFT, softened
 from contextdb.motion.preparing.describing import (
     Described,
     by_rig,
@@ -74,7 +75,7 @@ SHOWN = {
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A cell that does not accept what its clip shows."""
+    """A cell that does not accept what its clip shows, or that is not soft though its column is to be."""
 
     row: int
     line: int | None
@@ -89,7 +90,9 @@ class Difference:
 
     def __str__(self) -> str:
         where = f"line {self.line}" if self.line is not None else row_name(self.row)
-        return f"{where}, {self.asset}, {self.column}: the cell is {self.cell}, the clip shows {self.clip}"
+        is_right = self.column in SOFT and self.clip == softened(self.cell, self.column)
+        wanted = "it would be" if is_right else "the clip shows"
+        return f"{where}, {self.asset}, {self.column}: the cell is {self.cell}, {wanted} {self.clip}"
 
 
 @dataclass
@@ -135,6 +138,12 @@ class ClipRows:
     rows: list[Described]
     files: list[Path]
     """Of each row its clip; of joint clips that of the first role."""
+
+    def soften(self, columns: Collection[str]) -> None:
+        """Make the cells of some columns of `SOFT` soft."""
+        for i, row in enumerate(self.rows):
+            soft = {name: softened(cell, name) for name, cell in row.cells.items() if name in columns}
+            self.rows[i] = replace(row, cells={**row.cells, **soft})
 
     def motion(self, table: Path) -> TomlSections | None:
         """What contextdb.toml is to say of the motion of a table: nothing where a project says it; None where it cannot."""
@@ -285,6 +294,8 @@ def filling(table: Table, rows: Sequence[Described]) -> Filling:
                 empty.append(each)
             elif not _accepts(table, name, text, known[asset]):
                 differences.append(each)
+            elif name in SOFT and cell.endswith(SOFT[name]) and _excludes(table, name, text):
+                differences.append(replace(each, clip=softened(text, name)))
     added = [row for row in rows if row.asset not in set(assets)]
     cells = {row.asset: row.cells for row in rows}
     without = [asset for asset in dict.fromkeys(assets) if asset not in known]
@@ -380,13 +391,24 @@ def _accepts(table: Table, column: str, text: str, row: Described) -> bool:
     }
     if column not in values:
         return _same_output(text, row.cells[column])
-    condition = table.schema.conditions.get(column)
-    if condition is None or values[column] is None:
+    if column not in table.schema.conditions or values[column] is None:
         return True
+    cell = _cell(table, column, text)
+    return cell is not None and cell.holds(values[column])
+
+
+def _excludes(table: Table, column: str, text: str) -> bool:
+    """Whether a cell of a condition can be read, is not Any and not soft."""
+    cell = _cell(table, column, text) if column in table.schema.conditions else None
+    return cell is not None and cell.accepts is not None and not cell.is_soft
+
+
+def _cell(table: Table, column: str, text: str) -> Cell | None:
+    """A cell of a condition; None where it cannot be read."""
     try:
-        return parse_cell(text, condition.domain, wants_mend=False).holds(values[column])
+        return parse_cell(text, table.schema.conditions[column].domain, wants_mend=False)
     except ContextDBError:
-        return False
+        return None
 
 
 def _same_output(text: str, cell: str) -> bool:

@@ -8,6 +8,7 @@ below it.
   contextdb motion describe game/clips
   contextdb motion describe game/clips --out game/moves.csv
   contextdb motion describe game --into game/moves.csv --update
+  contextdb motion describe game --into game/moves.csv --update --soft direction --soft turn
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from contextdb.commands.motion_clips import add_clip_arguments, progress_of
 from contextdb.console import ExitCode, note, output, printable
 from contextdb.errors import ContextDBError, Fault, plural, some
 from contextdb.files.toml_shapes import as_toml
+from contextdb.motion.preparing.cells_of_clips import SOFT
 from contextdb.motion.preparing.describing import COLUMNS, Described
 from contextdb.report.render_json import as_json
 from contextdb.tables.nesting.names import asset_text
@@ -46,6 +48,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--into", metavar="TABLE", help="fill what is missing in this table, and report where it differs from the clips"
     )
     parser.add_argument("--update", action="store_true", help="with --into: replace the cells that differ, too")
+    parser.add_argument(
+        "--soft",
+        metavar="COLUMN",
+        action="append",
+        choices=SOFT,
+        default=[],
+        help=f"{' or '.join(SOFT)}: its cells cost in place of excluding; with --into, --update changes those that are there",
+    )
     parser.add_argument("--json", action="store_true", help="print a JSON document, with what was measured")
 
 
@@ -58,6 +68,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     clips = rows_for(
         arguments.path, into, progress_of, arguments.metres_per_unit, arguments.up, engines_of(arguments), arguments.root_from
     )
+    clips.soften(arguments.soft)
     folder_clips, rows = clips.source, clips.rows
     made, fills, is_playable = None, None, True
     if arguments.out or into is not None:

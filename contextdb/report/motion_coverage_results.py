@@ -264,7 +264,9 @@ def capture_sentence(each: ToCapture) -> str:
     """What to capture, what that brings, and where it is missing."""
     sides = ", and the other side by its mirror" if each.is_both_sides else ""
     moves = (
-        f"; {some(each.elsewhere)} {'moves' if len(each.elsewhere) == 1 else 'move'} so, not valid there" if each.elsewhere else ""
+        f"; {some(each.elsewhere)} {'moves' if len(each.elsewhere) == 1 else 'move'} like this, but not valid there"
+        if each.elsewhere
+        else ""
     )
     fills, contexts = format_percent(each.fills, 1), format_percent(each.contexts, 1)
     return f"{each.words}: fills {fills} of what is wanted{sides}; missing in {contexts} of the contexts{moves}"

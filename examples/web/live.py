@@ -10,6 +10,7 @@ import argparse
 import sys
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
 from contextdb.errors import ContextDBError
 from contextdb.telemetry.link.hearing import Wanted, hear, the_game
@@ -25,8 +26,9 @@ class Page(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Answer this machine's own browser: a page elsewhere that leads here under another name gets nothing."""
-        host, port = self.server.server_address[:2]
-        if self.headers.get("Host") not in (f"{host!s}:{port}", f"localhost:{port}"):
+        address: Any = self.server.server_address
+        host, port = address[:2]
+        if self.headers.get("Host") not in (f"{host}:{port}", f"localhost:{port}"):
             self.send_error(403)
         elif self.path == "/lines":
             self._lines()

@@ -21,6 +21,8 @@ Key = TypeVar("Key", bound=Hashable)
 ANY = "Any"
 CONDITIONS = ("gait", "speed", "direction", "turn", "style")
 OUTPUTS = ("duration_s", "start", "end")
+SOFT = {"direction": "~0.5/30", "turn": "~0.5/30"}
+"""What facts beyond a cell cost where a column is to exclude nothing: 0.5 for each 30 degrees, or 30 degrees a second."""
 BEYOND = 0.15
 """How far a cell reaches beyond the middle between two clips, of the way between them."""
 
@@ -66,6 +68,11 @@ def cells_of(facts: Sequence[ClipFacts], rigs: Sequence[Hashable], mirrored: boo
     for i, style in _styles(facts, rigs).items():
         cells[i]["style"] = style
     return cells
+
+
+def softened(cell: str, column: str) -> str:
+    """A cell of a column of `SOFT` that excludes nothing; one that is Any already does not."""
+    return cell if cell == ANY else f"{cell} {SOFT[column]}"
 
 
 def _outputs(facts: ClipFacts) -> dict[str, str]:

@@ -72,13 +72,13 @@ def waiting(before: Playing, playing: Playing, cost: float, bar: float, left_s: 
 
 def continued(trigger: Trigger, before: Playing, cost: float, best: float) -> str:
     """The reason when playing on is chosen."""
-    text = f"{trigger.sentence(before)}: playing on costs {cost:.4g}"
+    text = f"{trigger.sentence(before)}: to play on costs {cost:.4g}"
     return f"{text}, the least." if cost <= best else f"{text}, about as little as the best, {best:.4g}."
 
 
 def settling(trigger: Trigger, before: Playing, cost: float, best: float, stayed_s: float) -> str:
     """The reason when something else costs less, and what plays was entered only now."""
-    text = f"{trigger.sentence(before)}: playing on costs {cost:.4g}"
+    text = f"{trigger.sentence(before)}: to play on costs {cost:.4g}"
     return f"{text}; the best, {best:.4g}, is too little less to leave it {stayed_s:.2f} s after it was entered."
 
 

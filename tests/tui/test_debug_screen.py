@@ -461,12 +461,12 @@ def test_the_pose_is_the_one_that_was_shown_and_the_pane_says_so(recording: Reco
 def test_every_text_has_the_contrast_of_wcag_in_every_theme(recording: Recording, size: tuple[int, int]):
     async def script(screen: DebugScreen, pilot: Pilot[Any]) -> set[tuple[str, str]]:
         screen.go(FIRST)
-        found = set[tuple[str, str]]()
+        unreadable = set[tuple[str, str]]()
         for theme in THEMES:
             screen.app.theme = theme.name
             await pilot.pause()
-            found |= faint(screen.app)
-        return found
+            unreadable |= faint(screen.app)
+        return unreadable
 
     assert shown(recording, script, size) == set()
 

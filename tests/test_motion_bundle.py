@@ -29,6 +29,7 @@ def test_a_bundle_holds_tables_databases_poses_and_controllers(game: Path):
     entries = np.frombuffer(octets[64 : 64 + 24 * n_parts], "<u8").reshape(-1, 3)
     assert (entries[:, 1] % 64 == 0).all()
     assert (entries[:, 1] + entries[:, 2] <= len(octets)).all()
+    assert {37, 38} <= {kind & 0xFFFFFFFF for kind in entries[:, 0].tolist()}  # what match nodes need: warps, and where clips end
     assert {"moves", "player"} <= {
         octets[at : at + n - 1].decode() for kind, at, n in entries.tolist() if kind & 0xFFFFFFFF in (81, 91)
     }

@@ -38,6 +38,7 @@ from contextdb.errors import ContextDBError, Fault, FileError, MotionError, Plac
 from contextdb.files.tensors import other_layout
 from contextdb.motion.characters.facts import FACTS, is_asked
 from contextdb.motion.clips.doubts import grouped
+from contextdb.motion.nodes.match_node import MatchNode
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.storage import building
 from contextdb.motion.storage.build_inputs import distinct_faults
@@ -281,7 +282,9 @@ def bundled(tables: Mapping[str, Table], config: MotionConfig, databases: Mappin
         names = config.databases_of(config.selector_of(name))
         schema = config.features[config.databases[names[0]].features]
         own = {each: banks[each] for each in names if each in banks}
-        players[name] = Played(config.controller(name, databases, rng=Random(0)), schema, own or None, config.output_of(name))
+        ends = {each: MatchNode(databases[each]).ends for each in own}
+        controller = config.controller(name, databases, rng=Random(0))
+        players[name] = Played(controller, schema, own or None, config.output_of(name), ends)
     return bundle_of(players, table_of, compiled)
 
 

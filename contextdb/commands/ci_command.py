@@ -21,7 +21,7 @@ from contextdb.commands.check_command import check_path
 from contextdb.commands.coverage_command import Tables, add_measuring_arguments, code_of, measured_results
 from contextdb.commands.coverage_telemetry import require_telemetry
 from contextdb.commands.gating import OPTIONS, Accepted, add_accepting_arguments, earlier_report, require_baseline
-from contextdb.commands.git_setup import Commit
+from contextdb.commands.git_tree import Commit
 from contextdb.commands.numbers import percent
 from contextdb.console import ExitCode, output, printable, terminal_width, wants_colour
 from contextdb.covering.baseline import ACCEPTED, Baseline, read_baseline

@@ -34,7 +34,7 @@ from contextdb.disk.folder_lock import UNFINISHED
 from contextdb.errors import ContextDBError
 from contextdb.exchange.formats import FORMATS, write
 from contextdb.expressions import read_expression
-from contextdb.files.scratch import line_of
+from contextdb.files.journal_lines import line_of
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.storage.stored import open_database, save_database
 from contextdb.tables.gap_work import gaps_path

@@ -39,7 +39,7 @@ from contextdb.commands.demo_command import sample_folder
 from contextdb.disk.folder_lock import UNFINISHED, temporary_name
 from contextdb.edits.edits import set_settings
 from contextdb.errors import ContextDBError, FileError
-from contextdb.files.scratch import line_of
+from contextdb.files.journal_lines import line_of
 from contextdb.motion import Trace, build
 from contextdb.tables.project import Project, load
 from tui.model.journal import journal_path

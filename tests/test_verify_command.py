@@ -14,8 +14,8 @@ import contextdb as cdb
 from contextdb import motion
 from contextdb.commands.verify_command import UNUSABLE, verified
 from contextdb.disk import write_atomic
+from contextdb.files.journal_lines import line_of
 from contextdb.files.reports import document_of, sealed, with_marks
-from contextdb.files.scratch import line_of
 from contextdb.motion.storage.pose_files import save_poses
 from contextdb.motion.storage.stored import save_database
 from contextdb.report import render

@@ -237,7 +237,7 @@ def _report(document: Mapping[str, object]) -> str:
 
 
 def _journal(path: Path) -> Kinds:
-    from contextdb.files.scratch import FORMAT, n_lost, read_records
+    from contextdb.files.journal_lines import FORMAT, n_lost, read_records
 
     yield "journal", None
     raw = read_bytes(path)

@@ -17,8 +17,8 @@ from contextdb.disk.folder_lock import temporary_name
 from contextdb.edits import edits
 from contextdb.errors import ContextDBError, FileError, TableError
 from contextdb.files.csv_source import read_csv
+from contextdb.files.journal_lines import line_of
 from contextdb.files.parquet import rewritten_parquet
-from contextdb.files.scratch import line_of
 from contextdb.tables.project import load
 from contextdb.tables.table import Table
 from tui.model import session as session_module

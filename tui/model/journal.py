@@ -47,7 +47,7 @@ from contextdb.edits.history import History, Step
 from contextdb.edits.schema_file import SchemaChange, schema_path
 from contextdb.edits.variant_rows import expanded, known_base
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural
-from contextdb.files.scratch import FORMAT, Record, line_of, n_lost, read_records
+from contextdb.files.journal_lines import FORMAT, Record, line_of, n_lost, read_records
 from contextdb.files.texts import texts_of
 from contextdb.tables.changes import Edit
 from contextdb.tables.project import schema_of

@@ -166,7 +166,7 @@ def _shared_components(sheet: Any, node: Any) -> None:
     if not names:
         return
     place = tuple((one._css_type_name, one.id, one.classes, one._pseudo_classes_cache_key) for one in node.css_path_nodes)
-    known = _components.setdefault((tuple(sheet._variables.items()), tuple(sheet.source), place), {})
+    known = _components.setdefault((tuple(sheet._variables.items()), tuple(sheet.source), place, node.app.no_color), {})
     before = dict(node._component_styles)
     node._component_styles.clear()
     for name in sorted(names):

@@ -11,6 +11,7 @@ from typing import Any
 from unittest.mock import patch
 
 from textual.app import App
+from textual.widgets import Input
 
 from tui.run import edit
 from tui.widgets.grid import Grid
@@ -27,6 +28,9 @@ def record(table: str, file: str, hold: str = ".") -> None:
     async def run_action(app: App[Any], action: Any, *more: Any, **others: Any) -> bool:
         if not Path(hold).exists() or str(action).startswith(("scroll_", "page_")):  # Textual's own, for what does not fit
             return await does_it(app, action, *more, **others)
+        node, name, parameters = app._parse_action(action, more[0] if more else app)
+        if isinstance(node, Input) and not node.check_action(name, parameters):  # what it leaves to the list under it
+            return False
         note(action)
         return True
 

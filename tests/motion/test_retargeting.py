@@ -9,7 +9,10 @@ import pytest
 from made_once import make_clip
 
 from contextdb import motion
+from contextdb.errors import MotionError
+from contextdb.motion.clips import quaternions
 from contextdb.motion.clips.bone_names import side_and_core
+from contextdb.motion.clips.poses import local_poses
 from contextdb.motion.clips.skeleton import sided_pairs
 
 MADE = make_clip("walk")
@@ -106,3 +109,62 @@ def test_a_bone_is_known_without_its_namespace():
     assert rig.index("LeftFoot") == rig.index("mixamorig:LeftFoot") == RIG.index("LeftFoot")
     two = replace(RIG, names=("a:Hips", "b:Hips", *RIG.names[2:]))
     assert "Hips" not in two
+
+
+def test_names_that_are_given_come_first_and_must_be_there():
+    rig = replace(RIG, names=tuple("Pelvis" if name == "Hips" else name for name in RIG.names))
+    again = motion.poses_of(motion.retargeted(CLIP, rig, names={"Pelvis": "Hips"}))
+    np.testing.assert_allclose(again.positions, POSES.positions, atol=1e-6)
+    with pytest.raises(MotionError, match="Did you mean"):
+        motion.retargeted(CLIP, rig, names={"Pelvis": "Hip"})
+
+
+def resting(clip: motion.Clip, turns: dict[str, float], heading: float = 0.0) -> motion.Clip:
+    """The same motion of a body that rests in another pose: some bones turned about the z axis, and all about the y axis."""
+    body = clip.skeleton
+    pose = np.tile([1.0, 0.0, 0.0, 0.0], (body.n_joints, 1))
+    for joint, parent in enumerate(body.parents.tolist()):
+        above = quaternions.about_axis("y", np.array(heading)) if parent < 0 else pose[parent]
+        pose[joint] = quaternions.multiply(above, quaternions.about_axis("z", np.array(turns.get(body.names[joint], 0.0))))
+    world, local = motion.poses_of(clip), local_poses(clip)
+    offsets = body.offsets * clip.metres_per_unit
+    offsets[1:] = quaternions.rotate(pose[body.parents[1:]], offsets[1:])
+    rotations = quaternions.multiply(world.rotations, quaternions.inverse(pose))
+    above = np.where(body.parents[:, None] < 0, np.array([1.0, 0.0, 0.0, 0.0]), rotations[:, np.maximum(body.parents, 0)])
+    turned = quaternions.multiply(quaternions.inverse(above), rotations)
+    return motion.Clip.from_arrays(body.names, body.parents, offsets, turned, local.positions[:, 0], clip.rate, name=clip.name)
+
+
+def standing(clip: motion.Clip, rest: dict[str, float], heading: float = 0.0) -> motion.Clip:
+    """A clip of one frame in which the made body stands at rest, of a body that rests otherwise."""
+    turns = np.tile([1.0, 0.0, 0.0, 0.0], (1, RIG.n_joints, 1))
+    plain = motion.Clip.from_arrays(RIG.names, RIG.parents, RIG.offsets * 0.01, turns, np.array([[0.0, 1.0, 0.0]]), 30.0)
+    return resting(plain, rest, heading)
+
+
+ARMS_UP = {"LeftArm": np.pi / 3.0, "RightArm": -np.pi / 3.0}
+
+
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+@pytest.mark.parametrize("which", ["the rig", "the clip"])
+def test_a_declared_pose_puts_arms_that_rest_otherwise_where_they_belong(which: str, heading: float):
+    other = resting(CLIP, ARMS_UP, heading)
+    np.testing.assert_allclose(motion.poses_of(other).positions, POSES.positions, atol=1e-9)
+    of_other, plain = standing(CLIP, ARMS_UP, heading), standing(CLIP, {})
+    clip, rig = (CLIP, other.skeleton) if which == "the rig" else (other, RIG)
+    with pytest.raises(MotionError, match=r"rig points another way at rest.*rig_pose"):
+        motion.retargeted(clip, rig)
+    for references in ([of_other], [of_other, plain]) if heading == 0.0 else ([of_other, plain],):
+        again = motion.poses_of(motion.retargeted(clip, rig, references=references))
+        np.testing.assert_allclose(again.positions, POSES.positions, atol=1e-6)
+
+
+def test_a_rig_that_rests_with_another_axis_up_is_refused():
+    lying = replace(RIG, offsets=RIG.offsets[:, [0, 2, 1]])
+    with pytest.raises(MotionError, match='"LeftLeg" of the rig points another way at rest'):
+        motion.retargeted(CLIP, lying)
+
+
+def test_a_rig_without_legs_is_refused():
+    with pytest.raises(MotionError):
+        motion.retargeted(CLIP, motion.Skeleton(("Hips",), np.array([-1]), np.zeros((1, 3)), (("Xposition",),)))

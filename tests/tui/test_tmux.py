@@ -302,7 +302,7 @@ def test_the_debugger_works_in_a_real_terminal(terminal):
     terminal.keys("Home", "Right")
     terminal.wait("tick 1 ", "Nothing was searched.")
     lines = terminal.screen.splitlines()
-    terminal.mouse(0, 78, next(at for at, line in enumerate(lines) if line.startswith("plays")))
+    terminal.mouse(0, 78, next(at for at, line in enumerate(lines) if line.split()[:1] == ["plays"]))
     terminal.wait("tick 14", "walk_tired")
     terminal.raw("/jog\r")
     terminal.wait("name holds jog")

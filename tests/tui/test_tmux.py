@@ -178,7 +178,7 @@ def test_two_editors_of_one_table_lose_nothing_of_what_was_saved_and_each_is_tol
         one.keys("Enter")
         one.wait("t *", "row 2 · speed")
     other_terminal.keys("C-s")
-    other_terminal.wait("it is not saved here")
+    other_terminal.wait("another editor", "has this table open")
     terminal.keys("C-s")
     terminal.wait("Saved t.csv.")
     other_terminal.wait("The file was changed on disk", "7", "2..25")

@@ -27,10 +27,11 @@ from contextdb.edits.schema_file import SchemaChange, schema_change
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, in_quotes
 from contextdb.exchange.mapping import COLUMN_JOBS, Mapped, as_condition, as_job, as_type, propose
 from contextdb.exchange.reading import Reading, commas_in_numbers, listed
+from contextdb.files.file_names import alike
 from contextdb.files.texts import AnySource, new_source
 from contextdb.schema.sections import condition_to_dict, job_faults
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict, settings_renamed, with_outputs
-from contextdb.tables.project import schema_for, settings_of
+from contextdb.tables.project import below, schema_for, settings_of, twice_named
 from contextdb.tables.table import Table
 
 NAMES = {"whole": "each text is one name", "words": "each word is a name"}
@@ -148,9 +149,14 @@ def plan_import(
 
 
 def project_of(path: Path) -> tuple[Schema, TableSettings]:
-    """What contextdb.toml declares for a table file that is there or not yet, and what it says of this table."""
+    """What contextdb.toml declares for a table file that is there or not yet, and what it says of this table. Raises TableError
+    where it declares a table of this name in another file."""
     folder, schema = schema_for(path)
-    return schema, settings_of(path, folder, schema)
+    settings = settings_of(path, folder, schema)
+    declared = schema.tables[settings.name].files if settings.name in schema.tables else ()
+    if declared and alike(below(path, folder)) not in map(alike, declared):
+        raise TableError(*twice_named([(settings.name, folder / declared[0]), (settings.name, path)]))
+    return schema, settings
 
 
 def table_of(

@@ -351,13 +351,13 @@ def _names_in(folder: Path) -> list[str]:
 def settings_of(path: Path, folder: Path, schema: Schema) -> TableSettings:
     """What contextdb.toml says of a table file: what it declares for this file, whatever the disk makes of its name; of a variant
     with what it inherits."""
-    below = _below(path, folder)
-    settings = schema.settings_for(below)
+    file_below = below(path, folder)
+    settings = schema.settings_for(file_below)
     if settings.name in schema.tables:
         return settings
     for declared in schema.tables.values():
         for file in declared.files:
-            if alike(file) == alike(below) and _is_same_file(folder / file, path):
+            if alike(file) == alike(file_below) and _is_same_file(folder / file, path):
                 return resolved(declared, schema.tables)
     return settings
 
@@ -402,7 +402,7 @@ def _read_table(path: Path, schema: Schema, folder: Path, strict: bool, around: 
     return table
 
 
-def _below(path: Path, folder: Path) -> str:
+def below(path: Path, folder: Path) -> str:
     """The path of a file below a folder, as contextdb.toml has it; links on the way to the file stay what they are named."""
     if path.is_relative_to(folder):
         return path.relative_to(folder).as_posix()

@@ -188,6 +188,14 @@ def test_what_plays_and_does_not_lead_to_an_event_is_left_and_says_so():
     assert one.update(DT, [3.5], force=True, event=("Hit", 0.1)).why.startswith("A search was forced: ")
 
 
+def test_a_database_without_the_event_does_not_lead_to_it_and_one_that_none_has_is_refused():
+    without, with_hit = line(p=[3.0] * 8), made({"q": [3.5] * 8}, {"q": {5}}, set(), {"q": ()})
+    one = Controller(Selector([Entry("a", without), Entry("b", with_hit)]), FEW)
+    assert one.update(DT, [3.0], event=("Hit", 0.2)).playing.asset == "q"
+    with pytest.raises(QueryError, match='Accepted: "Hit"'):
+        one.update(DT, [3.0], event=("Hti", 0.2))
+
+
 def test_a_crowd_is_asked_for_events_as_its_characters_are():
     def characters(n):
         settings = ControllerSettings(search_every_s=0.1)

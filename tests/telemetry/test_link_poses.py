@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from links import listening, meeting, until
+from links import LIMIT_S, listening, meeting, until
 
 import contextdb as cdb
 from contextdb import motion
@@ -21,6 +21,7 @@ from contextdb.telemetry.link.hearing import Wanted, hear
 from examples.web import live
 
 __all__ = ["meeting"]
+GODOT = Path(live.HERE).parent / "godot"
 FACTS = {"gait": "Walk", "style": "normal"}
 JOINTS = """
 import { places } from LIVE
@@ -143,6 +144,35 @@ def test_a_run_is_published_in_its_time(meeting, tmp_path, monkeypatch, tables):
     assert max(slept) <= 31 / 30
     assert {"bones", "pose", "decision", "end"} <= {line["line"] for line in lines}
     assert {line["who"] for line in lines if "who" in line} == {"walk"}
+
+
+def test_godot_has_the_joints_where_python_has_them(link, meeting, tables, tmp_path):
+    godot = shutil.which("godot3-server")
+    if godot is None:
+        pytest.skip("godot3-server is not installed: Debian's package of that name runs scripts without a screen")
+    shutil.copytree(GODOT, tmp_path, dirs_exist_ok=True)
+    one, poses = motion.Character.of(cdb.Project.load(tables), "player"), []
+    with live.server("poses", 0) as page:
+        threading.Thread(target=page.serve_forever, daemon=True).start()
+        words = [godot, "--path", ".", "-s", "receive.gd", f"--port={page.server_port}"]
+        playing = subprocess.Popen(words, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        try:
+            until(lambda: link._feed.wants_poses)
+            with hear(meeting / "poses.sock", Wanted(poses=True)) as hearing:
+                for tick in range(60):
+                    poses.append(one.update(1 / 10, (1.3 if tick > 30 else 0.0, 1.3), FACTS).pose)
+                    link.pose("player", poses[-1], one.stream.rig)
+                    lines_until(hearing, "pose")
+            link.close()
+            _, stderr = playing.communicate(timeout=LIMIT_S)
+        finally:
+            playing.kill()
+            page.shutdown()
+    assert "SCRIPT ERROR" not in stderr, stderr
+    lines = [json.loads(line) for line in (tmp_path / "received.jsonl").read_text(encoding="utf-8").splitlines()]
+    assert [line["asset"] for line in lines] == [pose.playing.asset for pose in poses]
+    assert len({line["asset"] for line in lines}) > 1
+    np.testing.assert_allclose([line["places"] for line in lines], [pose.positions for pose in poses], atol=1e-4)
 
 
 def test_the_page_gets_the_lines_and_no_other_page_does(link, meeting, tables):

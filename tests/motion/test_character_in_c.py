@@ -16,7 +16,7 @@ import pytest
 from c_compilers import PROGRAMS, all_compilers, compiled, ran, sanitizers, variants
 from made_once import make_clip
 from strategies import IS_FULL
-from test_output_ground import slope
+from test_output_ground import slope, stairs
 
 import contextdb as cdb
 from contextdb import motion
@@ -32,6 +32,7 @@ from contextdb.motion.storage.bundle import Played, bundle_of
 pytestmark = pytest.mark.skipif(os.name == "nt" or not all_compilers(), reason="no gcc or clang was found")
 MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", Path(__file__).parents[2].parent / "shared" / "data" / "mocap"))
 N_DAMAGED = int(os.environ.get("DAMAGED", 4_000 if IS_FULL else 100))
+N_SESSIONS = int(os.environ.get("SESSIONS", 12 if IS_FULL else 3))
 NAMES = ("idle", "walk", "walk_turn_left_90", "jog", "start_walk", "stop_walk")
 CAPTURED = (
     "walk_normal", "walk_tired", "walk-turn-left_normal", "run_normal", "walk-turn-right_normal", "run_tired", "walk-back_normal",
@@ -178,7 +179,7 @@ def session(rng, n_ticks, is_captured=False):
     played = Played(controller, schema, banks, output, {name: node.ends for name, node in nodes.items()})
     banks = moving_alike(banks)
     bundle = bundle_of({"player": played}, {"turns": "moves", "all": "moves"}, {"moves": file_of("moves", table(is_captured))})
-    n, ground = rng.randint(1, 4), rng.choice([None, slope])
+    n, ground = rng.randint(1, 4), rng.choice([None, slope, stairs])
     members = [
         motion.Character(controller.copy(), schema, table(is_captured), motion.PoseStream(banks, output), ground=ground)
         for _ in range(n)
@@ -209,7 +210,7 @@ def session(rng, n_ticks, is_captured=False):
         else:
             updates = crowd.update(dt, sticks, {"gait": gaits}, event=events)
         once = [None if one is None or one.is_done else one for one in once]
-        given.append(struct.pack("dqq", dt, ground is not None, len(entries)))
+        given.append(struct.pack("dqq", dt, [None, slope, stairs].index(ground), len(entries)))
         for stick, facing, event, updated in zip(sticks, facings, events, updates, strict=True):
             number = CONDITIONS["gait"]["values"].index(updated.facts["gait"])
             event_number, in_s = (-1, 0.0) if event is None else (EVENTS.index(event[0]), event[1])
@@ -239,10 +240,10 @@ def same(out, expected):
     assert at == len(out)
 
 
-@pytest.mark.parametrize("seed", range(12 if IS_FULL else 3))
+@pytest.mark.parametrize("seed", range(N_SESSIONS))
 def test_characters_in_c_are_those_of_python_to_the_bit(seed, programs, tmp_path: Path):
     is_captured = seed % 2 == 1 and (MOCAP / "assets.csv").is_file()
-    bundle, given, expected = session(random.Random(seed), 1800 if IS_FULL else 150, is_captured)
+    bundle, given, expected = session(random.Random(seed), 2700 if IS_FULL else 150, is_captured)
     (tmp_path / "bundle").write_bytes(bundle)
     (tmp_path / "in").write_bytes(given)
     for program in programs:

@@ -6,7 +6,7 @@
  *   update(dt) -> ""                      or what was wrong: then all stand where they stood
  *   asset(i), why(i) -> text              what plays, and what it did and why
  *   root(i) -> [x, z, heading]            of the pose
- *   rotations(i) -> [x, y, z, w, ...]     of the joints against their parents
+ *   rotations(i) -> [w, x, y, z, ...]     of the joints against their parents
  *   positions(i) -> [x, y, z, ...]        of the joints in the world
  *   joints() -> [name, ...], parents() -> [number, ...]
  *   problem() -> text                     what was wrong with the last call, or "" */

@@ -19,7 +19,7 @@ import contextdb as cdb
 from contextdb import motion
 from contextdb.cli import main as run_contextdb
 from contextdb.commands.compile_command import c_motion_header
-from contextdb.compiled.c_header import c_header_of
+from contextdb.compiled.c_header import c_header_of, c_link_of
 from contextdb.compiled.engine_facts import csharp_of, godot_of, unreal_of
 from contextdb.motion.made.body import made_skeleton
 
@@ -142,6 +142,8 @@ def project(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """The files of an example, with the header that it includes."""
     shutil.copytree(EXAMPLES / request.param, tmp_path, dirs_exist_ok=True)
     (tmp_path / "contextdb_motion.h").write_text(c_motion_header(c_header_of({}, "CDB_MOTION_READER_H")), encoding="ascii")
+    (tmp_path / "tables.h").write_text(c_header_of({}), encoding="ascii")
+    (tmp_path / "cdb_link.h").write_text(c_link_of({}, "tables.h"), encoding="ascii")
     return tmp_path
 
 

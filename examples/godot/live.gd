@@ -27,7 +27,7 @@ func _process(delta):
 		_receive()
 	var camera = get_node_or_null("Camera")
 	if camera != null and not characters.empty():
-		camera.translation = characters.values()[0].skeleton.translation + Vector3(0, 3, 7)
+		camera.translation = characters.values()[0].skeleton.translation + Vector3(0, 2.4, 4)
 
 func _begin():
 	_stream = StreamPeerTCP.new()
@@ -90,8 +90,7 @@ func _make(bones):
 		skeleton.set_bone_parent(joint, int(bones.parents[joint]))
 		skeleton.set_bone_rest(joint, Transform(Basis(), _vector(bones.offsets[joint])))
 		var box = MeshInstance.new()
-		box.mesh = CubeMesh.new()
-		box.scale = Vector3(0.04, 0.04, 0.04)
+		box.mesh = preload("res://joint.tres")
 		var place = BoneAttachment.new()
 		place.bone_name = bone
 		place.add_child(box)

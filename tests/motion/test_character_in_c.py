@@ -65,6 +65,11 @@ MARKS = Markup.parse(
     "walk,Contact.Left,0.2,0.5,\nwalk,Contact.Right,0.7,0.9,\njog,Contact.Left,0.1,0.3,\nwalk_turn_left_90,Contact.Right,0.3,0.6,\n"
     "walk,Excluded,0.55,0.6,\nidle,Hit.Soft,1.0,1.2,\nstart_walk,Hit,0.5,0.6,\nwalk_turn_left_90,Hit,0.2,0.3,\n"
 )
+CAPTURED_MARKS = Markup.parse(
+    "asset,tag,from,to,value\nwalk_normal,Contact.Left,0.5,0.8,\nwalk_normal,Contact.Right,1.0,1.3,\nrun_normal,Contact.Left,0.3,0.4,\n"
+    "walk_tired,Hit,0.8,0.9,\nwalk-turn-left_normal,Hit.Soft,0.6,0.7,\nwalk-turn-left_normal,Contact.Right,0.2,0.5,\n"
+    "walk-back_normal,NextNaturalOnly,0,0.5,\nrun_tired,Excluded,0.5,0.6,\n"
+)
 CAPTURED_GAITS = [{"run": "Run", "dash": "Run"}.get(name.split("_")[0], "Idle Walk") for name in CAPTURED]
 CAPTURED_COLUMNS = {"Asset Name": list(CAPTURED), "gait": CAPTURED_GAITS, "direction": ["Any"] * len(CAPTURED)}
 CONDITIONS = {"gait": {"type": "enum", "values": ["Idle", "Walk", "Run"]}, "direction": {"type": "angle"}}
@@ -100,7 +105,7 @@ def parts(ways, is_captured):
     feet = [{"type": "position", "bone": bone} for bone in (left, right)]
     channels = [*feet, {"type": "velocity", "bone": "Hips"}, *WAYS[ways]]
     schema = motion.FeatureSchema.from_dict("loco", {"rate": 30.0, "channels": channels, "mirror": [mirrored.split()]})
-    marks = None if is_captured else MARKS
+    marks = CAPTURED_MARKS if is_captured else MARKS
     clips = [*map(captured, CAPTURED)] if is_captured else [make_clip(name).clip for name in NAMES]
     takes = {"turns": clips[2:3], "all": clips}
     databases = {name: motion.MotionDatabase.build(own, schema, mirror=True, markup=marks) for name, own in takes.items()}
@@ -186,14 +191,13 @@ def session(rng, n_ticks, is_captured=False):
     ]
     crowd, given, expected = motion.Crowd(members), [struct.pack("qq", n, n_ticks)], []
     sticks, facings, events, once = [(0.0, 0.0)] * n, [math.nan] * n, [None] * n, [None] * n
-    n_events = 2 if is_captured else 3
     for tick in range(n_ticks):
         dt = rng.choice([1 / 30, 1 / 30, 1 / 60, 1 / 144]) if tick else 0.0
         for i in range(n):
             if rng.random() < 0.06:
                 speed, way = rng.choice([0.0, 1.2, 2.6]), rng.uniform(-math.pi, math.pi)
                 sticks[i] = (speed * math.sin(way), speed * math.cos(way))
-            name, left_s = events[i] or (rng.choice(EVENTS[:n_events]), rng.choice([0.2, 0.5, 1.0]))
+            name, left_s = events[i] or (rng.choice(EVENTS), rng.choice([0.2, 0.5, 1.0]))
             is_going_on = events[i] is not None and left_s > 0.0
             events[i] = (name, max(left_s - dt, 0.0)) if is_going_on or rng.random() < 0.04 else None
         gaits = ["Idle" if not math.hypot(*stick) else "Walk" if math.hypot(*stick) < 2.0 else "Run" for stick in sticks]

@@ -20,6 +20,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -99,12 +100,21 @@ def work() -> None:
 
 def character_of() -> Any:
     """A character with everything on."""
+    from contextdb import motion
+
+    controller, schema, table, banks = parts_of()
+    return motion.Character(controller, schema, table, motion.PoseStream(banks), ground=slope)
+
+
+def parts_of(n_copies: int = 1) -> tuple[Any, Any, Any, Any]:
+    """Its controller, features, table and poses, of each clip and copies of it."""
     from benchmarks import captured
     from contextdb import Table, motion
     from contextdb.motion.made.recipes import made_clips
 
     clips = {path.stem: path for path in sorted(captured.FOLDER.glob("bandai_namco/*.bvh"))}
     loaded = [motion.load_bvh(path) for path in clips.values()] or [made.clip for made in made_clips()]
+    loaded += [replace(clip, name=f"{clip.name}_{n}") for n in range(1, n_copies) for clip in loaded]
     feet = ("Foot_L", "Foot_R") if clips else ("LeftFoot", "RightFoot")
     channels = [
         *({"type": "position", "bone": foot, "weight": 0.75} for foot in feet),
@@ -133,7 +143,7 @@ def character_of() -> Any:
     table = Table.from_columns(columns, conditions).compile()
     selector = motion.Selector([motion.Entry(kind, database) for kind, database in databases.items()])
     controller = motion.Controller(selector, motion.ControllerSettings(search_every_s=0.1))
-    return motion.Character(controller, schema, table, motion.PoseStream(banks), ground=slope)
+    return controller, schema, table, banks
 
 
 def _kind(name: str) -> str:

@@ -20,6 +20,7 @@ from tui.themes import LIGHT
 
 UNRUN = {
     "programmers.md": "a program in C, which tests/test_c_header.py compiles and runs",
+    "engines.md": "a program in C, which tests/test_engines.py compiles and runs",
     "live.md": "seconds of a running game; tests/test_live_command.py asks the sample table for what they say",
 }
 """Pages with output under a block of the shell or of C, which no session of a page can run, and what holds it instead."""

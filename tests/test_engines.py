@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import json
 import random
+import re
 import shutil
 import subprocess
 from datetime import date, timedelta
 from pathlib import Path
 
+import c_compilers
 import numpy as np
 import pytest
-from c_compilers import CXX, C, built, compiler_for, ran, sanitizers
+from c_compilers import CXX, PROGRAMS, C, built, compiler_for, ran, sanitizers
 
 import contextdb as cdb
 from contextdb import motion
 from contextdb.cli import main as run_contextdb
 from contextdb.commands.compile_command import c_motion_header
-from contextdb.compiled.c_header import c_header_of
+from contextdb.compiled.c_header import c_header_of, c_link_of
 from contextdb.compiled.engine_facts import csharp_of, godot_of, unreal_of
 from contextdb.motion.made.body import made_skeleton
 
@@ -35,6 +37,44 @@ SCHEMA: dict[str, dict[str, object]] = {
     "is_hurt": {"type": "bool", "expr": "wounds > 2"},
 }
 N_MOMENTS = 1000
+PAGE = (EXAMPLES.parent / "docs" / "engines.md").read_text(encoding="utf-8")
+FRAME = """#define CDB_FILES
+#include <stdio.h>
+#include "contextdb_motion.h"
+
+static int n_drawn;
+
+static void my_ground(void *user, double x, double z, double *ground)
+{
+    (void)user, (void)x, (void)z;
+    ground[0] = ground[1] = ground[2] = 0.0;
+}
+
+static void draw(const double *root, const double *rotations, const double *translations)
+{
+    n_drawn += root[1] > -1.0 && rotations && translations;
+}
+
+int main(void)
+{
+    size_t size;
+    void *bytes = cdb_read_file("game.motion", &size, NULL);
+    double x = 0.0, z = 0.0, heading = 0.0, dt = 1.0 / 60.0;
+    int gait, tick;
+OPENING
+    gait = cdb_condition_number(live->schema, "gait");
+    cdb_set_text(live, cdb_condition_number(live->schema, "style"), "normal");
+    if (why) return puts(why), 1;
+    for (tick = 0, z = 1.3; tick < 60; tick++) {
+FRAME
+    }
+    printf("%s\\n%d\\n", cdbm_asset(&player, &pose.decision.playing), n_drawn);
+    free(live), free(room.at), free(memory), free(state);
+    cdbm_close_player(&player);
+    CDB_FREE(bytes);
+    return 0;
+}
+"""
 BODY = made_skeleton()
 CPP17 = [*CXX[:1], "-std=c++17", *CXX[2:]]
 
@@ -102,6 +142,8 @@ def project(tmp_path: Path, request: pytest.FixtureRequest) -> Path:
     """The files of an example, with the header that it includes."""
     shutil.copytree(EXAMPLES / request.param, tmp_path, dirs_exist_ok=True)
     (tmp_path / "contextdb_motion.h").write_text(c_motion_header(c_header_of({}, "CDB_MOTION_READER_H")), encoding="ascii")
+    (tmp_path / "tables.h").write_text(c_header_of({}), encoding="ascii")
+    (tmp_path / "cdb_link.h").write_text(c_link_of({}, "tables.h"), encoding="ascii")
     return tmp_path
 
 
@@ -123,6 +165,35 @@ def square(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str], b
             poses.append(np.concatenate([*map(np.ravel, (updated.pose.root, updated.pose.rotations, updated.pose.positions))]))
             played.append(updated.decision.playing.asset)
     return folder / "game.motion", played, np.array(poses).tobytes()
+
+
+@pytest.fixture(scope="module")
+def sample(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The sample tables' bundle, as the page of the engines makes it, beside the header."""
+    folder = tmp_path_factory.mktemp("sample")
+    shutil.copytree(EXAMPLES.parent / "tables", folder / "tables")
+    motion.write_made_clips(folder / "tables" / "clips")
+    assert run_contextdb(["motion", "build", str(folder / "tables"), "--bundle", str(folder / "game.motion")]) == 0
+    (folder / "contextdb_motion.h").write_text(c_motion_header(c_header_of({}, "CDB_MOTION_READER_H")), encoding="ascii")
+    return folder
+
+
+def played(source: Path, folder: Path) -> str:
+    """What a program prints that is compiled as the page says, in the folder of its header and its bundle."""
+    command = [compiler_for(C), *C, *sanitizers(compiler_for(C)), "-ffp-contract=off"]
+    return ran(c_compilers.compiled(command, source, folder / "program.exe", folder, "-lm"), cwd=folder)
+
+
+def test_the_program_of_the_page_walks(sample: Path):
+    source = (PROGRAMS / "walk.c").read_text(encoding="utf-8")
+    assert f"```c\n{source}```" in PAGE
+    assert f"```text\n{played(PROGRAMS / 'walk.c', sample)}```" in PAGE
+
+
+def test_what_the_page_says_of_a_character_whose_memory_the_game_gives_is_compiled_and_plays(sample: Path):
+    opening, frame = re.findall(r"```c\n((?:cdbm_bundle bundle;|cdb_set_text\(live, gait).*?)```", PAGE, re.S)
+    (sample / "frame.c").write_text(FRAME.replace("OPENING", opening).replace("FRAME", frame), encoding="ascii")
+    assert played(sample / "frame.c", sample).splitlines() == ["start_walk", "60"]
 
 
 def needed(program: str, reason: str) -> str:

@@ -4,9 +4,10 @@
  *   place(i, x, z, heading)               stand there, with nothing played yet
  *   steer(i, x, z, facing, facts)         the velocity that the stick asks for, m/s; a heading or null; a Dictionary for the tables
  *   update(dt) -> ""                      or what was wrong: then all stand where they stood
+ *   publish(game) -> name                 of the link by which each update is published from now on; "" where there can be none
  *   asset(i), why(i) -> text              what plays, and what it did and why
  *   root(i) -> [x, z, heading]            of the pose
- *   rotations(i) -> [x, y, z, w, ...]     of the joints against their parents
+ *   rotations(i) -> [w, x, y, z, ...]     of the joints against their parents
  *   positions(i) -> [x, y, z, ...]        of the joints in the world
  *   joints() -> [name, ...], parents() -> [number, ...]
  *   problem() -> text                     what was wrong with the last call, or "" */
@@ -15,6 +16,7 @@ typedef struct characters {
     void *bytes;
     cdbm_crowd *crowd;
     facts *facts;                   /* [n, tables] */
+    publishing *published;          /* or NULL */
     sentence problem;
 } characters;
 
@@ -23,6 +25,7 @@ static void drop_characters(characters *own)
     size_t n = own->crowd ? cdbm_crowd_size(own->crowd, CDBM_N_CHARACTERS) * cdbm_crowd_size(own->crowd, CDBM_N_TABLES) : 0, i;
     for (i = 0; own->facts && i < n; i++) drop_facts(&own->facts[i]);
     free(own->facts);
+    stop_publishing(own->published);
     cdbm_close_crowd(own->crowd);
     CDB_FREE(own->bytes);
     memset(own, 0, sizeof *own);
@@ -108,7 +111,21 @@ METHOD(update)
     if (own->problem[0]) return of_text(own->problem);
     why = cdbm_update_crowd(own->crowd, as_real(arguments[0]), &fault);
     if (why) say(own->problem, fault.name, why);
+    else if (own->published) publish_poses(own->published, own->crowd);
     return of_text(own->problem);
+}
+
+METHOD(publish)
+{
+    char *game;
+    BEGIN(characters, 1);
+    if (!own->crowd) say(own->problem, "", "no bundle is open");
+    if (own->problem[0]) return of_text("");
+    stop_publishing(own->published);
+    game = text_of(arguments[0]);
+    own->published = game ? begin_publishing(own->crowd, game) : NULL;
+    free(game);
+    return of_text(own->published ? own->published->link.game : "");
 }
 
 METHOD(asset_of)
@@ -199,7 +216,7 @@ static void destroy_characters(void *object, void *data, void *user)
 static void register_characters(void *library)
 {
     static const class_method methods[] = {
-        {"open", open_characters}, {"place", place}, {"steer", steer}, {"update", update}, {"asset", asset_of}, {"why", why}, {"root", root},
+        {"open", open_characters}, {"place", place}, {"steer", steer}, {"update", update}, {"publish", publish}, {"asset", asset_of}, {"why", why}, {"root", root},
         {"rotations", rotations}, {"positions", positions}, {"joints", joints}, {"parents", parents}, {"problem", problem_of_characters}};
     register_class(library, "ContextCharacters", create_characters, destroy_characters, methods, sizeof methods / sizeof *methods);
 }

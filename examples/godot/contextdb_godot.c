@@ -11,10 +11,12 @@
  *   ContextCharacters    plays characters of a bundle: see context_characters.h */
 
 #define CDB_FILES
+#include "cdb_link.h"
 #include <stdio.h>
 #include "contextdb_motion.h"
 #include "godot.h"
 #include "context_facts.h"
+#include "context_link.h"
 #include "context_characters.h"
 
 typedef struct context_table {

@@ -13,8 +13,7 @@ func _ready():
 		return
 	for _joint in characters.joints():
 		var box = MeshInstance.new()
-		box.mesh = CubeMesh.new()
-		box.scale = Vector3(0.04, 0.04, 0.04)
+		box.mesh = preload("res://joint.tres")
 		add_child(box)
 		boxes.append(box)
 

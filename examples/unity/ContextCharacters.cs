@@ -99,7 +99,7 @@ namespace ContextDB
         /// <summary>x, z and heading of the pose.</summary>
         public void CopyRoot(int character, double[] to) { Copy(character, 4, to, 3); }
 
-        /// <summary>Of each joint x, y, z and w against its parent.</summary>
+        /// <summary>Of each joint w, x, y and z against its parent.</summary>
         public void CopyRotations(int character, double[] to) { Copy(character, 5, to, 4 * Joints.Length); }
 
         /// <summary>Of each joint x, y and z in the world.</summary>

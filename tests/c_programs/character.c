@@ -36,6 +36,12 @@ static void slope(void *user, double x, double z, double *ground)
     ground[0] = 0.2 * z, ground[1] = -0.0, ground[2] = 0.2;
 }
 
+static void stairs(void *user, double x, double z, double *ground)
+{
+    (void)user, (void)x;
+    ground[0] = 0.12 * floor(z / 0.5), ground[1] = -0.0, ground[2] = -0.0;
+}
+
 static void write_all(FILE *out, const void *items, size_t size, size_t n)
 {
     if (fwrite(items, size, n, out) != n) exit(2);
@@ -88,8 +94,8 @@ static void enter(const cdbm_player *player, int64_t n_entries, const memory *ow
     memcpy(copies->one_offs, own->one_offs, n * sizeof *own->one_offs);
 }
 
-/* An update: seconds, whether there is a ground, how many enter a one-off, and for each its goal, the number of its gait, a fact of the
- * one table, the number of an event, -1 for none, and in how many seconds that is to happen. */
+/* An update: seconds, the ground (0 flat, 1 a slope, 2 stairs), how many enter a one-off, and for each its goal, the number of its gait,
+ * a fact of the one table, the number of an event, -1 for none, and in how many seconds that is to happen. */
 static void update(const cdbm_player *player, size_t n, const memory *own, const memory *copies, FILE *out)
 {
     double *states = own->states;
@@ -109,7 +115,7 @@ static void update(const cdbm_player *player, size_t n, const memory *own, const
     for (i = 0; i < n; i++) {
         memset(&inputs[i], 0, sizeof inputs[i]);
         memcpy(&inputs[i].goal, take(8, 3), sizeof inputs[i].goal);
-        if (numbers[0]) inputs[i].ground = slope;
+        inputs[i].ground = numbers[0] == 2 ? stairs : numbers[0] ? slope : NULL;
         for (k = 0; schema && k < schema->n_conditions; k++) facts[8 * i + k] = cdbi_missing(&schema->conditions[k]);
         memcpy(&numbers[1], take(8, 1), 8);
         if (gait >= 0) facts[8 * i + (size_t)gait].whole = numbers[1];

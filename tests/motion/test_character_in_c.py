@@ -16,7 +16,7 @@ import pytest
 from c_compilers import PROGRAMS, all_compilers, compiled, ran, sanitizers, variants
 from made_once import make_clip
 from strategies import IS_FULL
-from test_output_ground import slope
+from test_output_ground import slope, stairs
 
 import contextdb as cdb
 from contextdb import motion
@@ -32,6 +32,7 @@ from contextdb.motion.storage.bundle import Played, bundle_of
 pytestmark = pytest.mark.skipif(os.name == "nt" or not all_compilers(), reason="no gcc or clang was found")
 MOCAP = Path(os.environ.get("CONTEXTDB_MOCAP", Path(__file__).parents[2].parent / "shared" / "data" / "mocap"))
 N_DAMAGED = int(os.environ.get("DAMAGED", 4_000 if IS_FULL else 100))
+N_SESSIONS = int(os.environ.get("SESSIONS", 12 if IS_FULL else 3))
 NAMES = ("idle", "walk", "walk_turn_left_90", "jog", "start_walk", "stop_walk")
 CAPTURED = (
     "walk_normal", "walk_tired", "walk-turn-left_normal", "run_normal", "walk-turn-right_normal", "run_tired", "walk-back_normal",
@@ -63,6 +64,11 @@ MARKS = Markup.parse(
     "stop_walk,MatchRange,0,2.2,\nstop_walk,WarpPosition,0.5,1.7,\nstop_walk,WarpRotation,0.9,4,\njog,Excluded,1.5,1.6,\n"
     "walk,Contact.Left,0.2,0.5,\nwalk,Contact.Right,0.7,0.9,\njog,Contact.Left,0.1,0.3,\nwalk_turn_left_90,Contact.Right,0.3,0.6,\n"
     "walk,Excluded,0.55,0.6,\nidle,Hit.Soft,1.0,1.2,\nstart_walk,Hit,0.5,0.6,\nwalk_turn_left_90,Hit,0.2,0.3,\n"
+)
+CAPTURED_MARKS = Markup.parse(
+    "asset,tag,from,to,value\nwalk_normal,Contact.Left,0.5,0.8,\nwalk_normal,Contact.Right,1.0,1.3,\nrun_normal,Contact.Left,0.3,0.4,\n"
+    "walk_tired,Hit,0.8,0.9,\nwalk-turn-left_normal,Hit.Soft,0.6,0.7,\nwalk-turn-left_normal,Contact.Right,0.2,0.5,\n"
+    "walk-back_normal,NextNaturalOnly,0,0.5,\nrun_tired,Excluded,0.5,0.6,\n"
 )
 CAPTURED_GAITS = [{"run": "Run", "dash": "Run"}.get(name.split("_")[0], "Idle Walk") for name in CAPTURED]
 CAPTURED_COLUMNS = {"Asset Name": list(CAPTURED), "gait": CAPTURED_GAITS, "direction": ["Any"] * len(CAPTURED)}
@@ -99,7 +105,7 @@ def parts(ways, is_captured):
     feet = [{"type": "position", "bone": bone} for bone in (left, right)]
     channels = [*feet, {"type": "velocity", "bone": "Hips"}, *WAYS[ways]]
     schema = motion.FeatureSchema.from_dict("loco", {"rate": 30.0, "channels": channels, "mirror": [mirrored.split()]})
-    marks = None if is_captured else MARKS
+    marks = CAPTURED_MARKS if is_captured else MARKS
     clips = [*map(captured, CAPTURED)] if is_captured else [make_clip(name).clip for name in NAMES]
     takes = {"turns": clips[2:3], "all": clips}
     databases = {name: motion.MotionDatabase.build(own, schema, mirror=True, markup=marks) for name, own in takes.items()}
@@ -178,21 +184,20 @@ def session(rng, n_ticks, is_captured=False):
     played = Played(controller, schema, banks, output, {name: node.ends for name, node in nodes.items()})
     banks = moving_alike(banks)
     bundle = bundle_of({"player": played}, {"turns": "moves", "all": "moves"}, {"moves": file_of("moves", table(is_captured))})
-    n, ground = rng.randint(1, 4), rng.choice([None, slope])
+    n, ground = rng.randint(1, 4), rng.choice([None, slope, stairs])
     members = [
         motion.Character(controller.copy(), schema, table(is_captured), motion.PoseStream(banks, output), ground=ground)
         for _ in range(n)
     ]
     crowd, given, expected = motion.Crowd(members), [struct.pack("qq", n, n_ticks)], []
     sticks, facings, events, once = [(0.0, 0.0)] * n, [math.nan] * n, [None] * n, [None] * n
-    n_events = 2 if is_captured else 3
     for tick in range(n_ticks):
         dt = rng.choice([1 / 30, 1 / 30, 1 / 60, 1 / 144]) if tick else 0.0
         for i in range(n):
             if rng.random() < 0.06:
                 speed, way = rng.choice([0.0, 1.2, 2.6]), rng.uniform(-math.pi, math.pi)
                 sticks[i] = (speed * math.sin(way), speed * math.cos(way))
-            name, left_s = events[i] or (rng.choice(EVENTS[:n_events]), rng.choice([0.2, 0.5, 1.0]))
+            name, left_s = events[i] or (rng.choice(EVENTS), rng.choice([0.2, 0.5, 1.0]))
             is_going_on = events[i] is not None and left_s > 0.0
             events[i] = (name, max(left_s - dt, 0.0)) if is_going_on or rng.random() < 0.04 else None
         gaits = ["Idle" if not math.hypot(*stick) else "Walk" if math.hypot(*stick) < 2.0 else "Run" for stick in sticks]
@@ -209,7 +214,7 @@ def session(rng, n_ticks, is_captured=False):
         else:
             updates = crowd.update(dt, sticks, {"gait": gaits}, event=events)
         once = [None if one is None or one.is_done else one for one in once]
-        given.append(struct.pack("dqq", dt, ground is not None, len(entries)))
+        given.append(struct.pack("dqq", dt, [None, slope, stairs].index(ground), len(entries)))
         for stick, facing, event, updated in zip(sticks, facings, events, updates, strict=True):
             number = CONDITIONS["gait"]["values"].index(updated.facts["gait"])
             event_number, in_s = (-1, 0.0) if event is None else (EVENTS.index(event[0]), event[1])
@@ -239,10 +244,10 @@ def same(out, expected):
     assert at == len(out)
 
 
-@pytest.mark.parametrize("seed", range(12 if IS_FULL else 3))
+@pytest.mark.parametrize("seed", range(N_SESSIONS))
 def test_characters_in_c_are_those_of_python_to_the_bit(seed, programs, tmp_path: Path):
     is_captured = seed % 2 == 1 and (MOCAP / "assets.csv").is_file()
-    bundle, given, expected = session(random.Random(seed), 1800 if IS_FULL else 150, is_captured)
+    bundle, given, expected = session(random.Random(seed), 2700 if IS_FULL else 150, is_captured)
     (tmp_path / "bundle").write_bytes(bundle)
     (tmp_path / "in").write_bytes(given)
     for program in programs:

@@ -26,6 +26,7 @@ typedef struct cdbm_player {
     cdbm_events events[CDBM_MOST_DATABASES];
     const int64_t *pose_ranges[CDBM_MOST_DATABASES]; /* [R] the range of poses of each range */
     const double *warps[CDBM_MOST_DATABASES], *ends[CDBM_MOST_DATABASES]; /* [R, 2, 2] and [N, 3], for match nodes; or NULL */
+    cdbm_tag_list tags[CDBM_MOST_DATABASES];
     cdbm_ways ways;
     cdbo_poses poses;
     cdbo_frames banks[CDBM_MOST_DATABASES];
@@ -156,6 +157,7 @@ static inline void cdbm_read_entry(cdbm_bundle *bundle, cdbm_player *player, siz
     if (clips->frames->n_features != player->controller.n_features) cdbm_refuse(bundle, "two databases have other features");
     player->n_ranges += clips->n_ranges, player->n_kinds += clips->n_kinds, player->n_frames += clips->frames->n_frames;
     cdbm_read_events(bundle, number, clips->frames->n_frames, &player->events[i]);
+    cdbm_read_tags(bundle, number, clips->n_kinds, &player->tags[i]);
     if (entry[2] >= (int64_t)player->n_tables) cdbm_refuse(bundle, "a database has a table that is not there");
     else if (entry[2] >= 0) {
         cdbm_read_rows(bundle, number, clips->n_ranges, player->opened[entry[2]]->table.n_rows, &player->tables[i]);

@@ -159,7 +159,8 @@ CDB_API double cdbm_enter_one(cdbm_crowd *crowd, size_t i, const char *database,
     double *state;
     if (i >= crowd->n || number < 0) return NAN;
     state = crowd->states + i * cdbm_state_width(&crowd->player);
-    match.database = (size_t)number, match.target = cdbm_seen_at(state, x, z, heading), match.query = NULL;
+    memset(&match, 0, sizeof match);
+    match.database = (size_t)number, match.target = cdbm_seen_at(state, x, z, heading);
     match.position_weight = match.rotation_weight = 1.0;
     if (cdbm_enter(&crowd->player, state, &crowd->inputs[i], &match, &one, crowd->room) != 1) return NAN;
     if (one.range >= 0.0 && one.cost <= most) crowd->one_offs[i] = one, crowd->inputs[i].one_off = &crowd->one_offs[i];

@@ -8,4 +8,5 @@
 #include "controller.h"
 #include "follow.h"
 #include "walk.h"
+#include "tags.h"
 #include "nodes.h"

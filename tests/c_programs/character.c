@@ -73,17 +73,62 @@ static void follow(const cdbm_player *player, size_t n, double dt_s, const memor
     free(packets);
 }
 
-/* Enter one-offs: of each who enters, in which database, the target and the two weights. Copies are given what their owners have. */
+/* What a match may be given beside its target, of 11 numbers: how each of three tags counts (0: not), and what it costs; a range whose asset
+ * costs more, and how much; whether a third of the frames is left out; the frame that a stitch leads to, and what it may cost. */
+typedef struct options {
+    cdbm_tags tags;
+    const char *lists[3][3];
+    cdbm_named_cost costs[2][3], penalty;
+    uint8_t *frames;
+    double *after;
+} options;
+
+static void give_options(const cdbm_player *player, const double *numbers, cdbm_match *match, options *own)
+{
+    const cdbm_frames *frames = &player->frames[match->database];
+    size_t counts[6] = {0, 0, 0, 0, 0, 0}, i;
+    memset(own, 0, sizeof *own);
+    for (i = 0; i < 3; i++) {
+        size_t way = (size_t)numbers[i], *n = &counts[way];
+        if (way >= 1 && way <= 3) own->lists[way - 1][(*n)++] = events[i];
+        if (way < 4) continue;
+        own->costs[way - 4][*n].name = events[i], own->costs[way - 4][(*n)++].cost = numbers[3 + i];
+    }
+    own->tags.include = own->lists[0], own->tags.n_include = counts[1], own->tags.every = own->lists[1], own->tags.n_every = counts[2];
+    own->tags.exclude = own->lists[2], own->tags.n_exclude = counts[3], own->tags.prefer = own->costs[0], own->tags.n_prefer = counts[4];
+    own->tags.avoid = own->costs[1], own->tags.n_avoid = counts[5];
+    if (counts[1] + counts[2] + counts[3] + counts[4] + counts[5] > 0) match->tags = &own->tags;
+    own->penalty.cost = numbers[7];
+    own->penalty.name = numbers[6] < 0.0 ? NULL : cdbm_text(&player->bundle, CDBM_P_ASSETS, (size_t)player->database_of[match->database], (size_t)numbers[6]);
+    if (own->penalty.name) match->penalties = &own->penalty, match->n_penalties = 1;
+    own->frames = (uint8_t *)malloc(frames->n_frames + 1), own->after = (double *)malloc((frames->n_features + 1) * sizeof(double));
+    if (!own->frames || !own->after) exit(1);
+    for (i = 0; i < frames->n_frames; i++) own->frames[i] = i % 3 != 0;
+    if (numbers[8] != 0.0) match->frames = own->frames;
+    if (numbers[9] >= 0.0) cdbm_features(frames, (int64_t)numbers[9], own->after);
+}
+
+/* Enter one-offs: of each who enters, in which database, the target, the two weights and options. Copies are given what their owners have. */
 static void enter(const cdbm_player *player, int64_t n_entries, const memory *own, const memory *copies, size_t n)
 {
     for (; n_entries > 0; n_entries--) {
-        const double *numbers = (const double *)take(8, 7);
+        const double *numbers = (const double *)take(8, 18), *state;
         size_t who = (size_t)numbers[0];
-        cdbm_match match = {0, {0.0, 0.0, 0.0}, 0.0, 0.0, NULL};
+        cdbm_input *input = &own->inputs[who];
+        cdbm_match match;
+        options given;
+        int is_done;
+        memset(&match, 0, sizeof match);
         match.database = (size_t)numbers[1], match.position_weight = numbers[5], match.rotation_weight = numbers[6];
         memcpy(&match.target, numbers + 2, sizeof match.target);
-        if (cdbm_enter(player, own->states + who * cdbm_state_width(player), &own->inputs[who], &match, &own->one_offs[who], own->room) != 1) exit(10);
+        give_options(player, numbers + 7, &match, &given);
+        state = own->states + who * cdbm_state_width(player);
+        is_done = numbers[16] < 0.0 ? cdbm_enter(player, state, input, &match, &own->one_offs[who], own->room)
+            : cdbm_stitch(player, state, input, &match, given.after, numbers[17], &own->one_offs[who], own->room);
+        if (is_done != 1) exit(10);
         own->are_playing[who] = own->one_offs[who].range >= 0.0;
+        free(given.frames);
+        free(given.after);
     }
     memcpy(copies->one_offs, own->one_offs, n * sizeof *own->one_offs);
 }
@@ -148,8 +193,12 @@ static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, c
 {
     cdbm_input input;
     uint8_t packet[CDBM_MOST_PACKET];
-    cdbm_match match = {0, {0.5, 2.0, 0.3}, 1.0, 1.0, NULL};
+    static const double ways[5][11] = {{0}, {3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, -1.0, 0.0}, {4.0, 5.0, 0.0, 1.0, 2.0, 0.0, -1.0, 0.0, 1.0, 0.0, 3.0},
+        {1.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0, 0.5, 0.0, -1.0, 0.0}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 9.0}};
+    cdbm_match match = {0, {0.5, 2.0, 0.3}, 1.0, 1.0, NULL, NULL, NULL, 0, NULL}, tried;
+    options given;
     cdbm_one_off one_off;
+    const double *way;
     float *matrices = (float *)malloc(16 * sizeof(float) * player->poses.rig.n_joints + 1);
     int tick;
     memset(&input, 0, sizeof input);
@@ -160,7 +209,12 @@ static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, c
         if (tick > 10) input.ground = slope;
         if (tick == 15 || tick == 25) {
             match.target.ahead = tick, match.database = drawn(seed) % player->controller.n_databases;
-            input.one_off = cdbm_enter(player, state, &input, &match, &one_off, room) == 1 && one_off.range >= 0.0 ? &one_off : NULL;
+            tried = match, way = ways[drawn(seed) % 5];
+            give_options(player, way, &tried, &given);
+            input.one_off = (way[9] < 0.0 ? cdbm_enter(player, state, &input, &tried, &one_off, room)
+                : cdbm_stitch(player, state, &input, &tried, given.after, way[10], &one_off, room)) == 1 && one_off.range >= 0.0 ? &one_off : NULL;
+            free(given.frames);
+            free(given.after);
         }
         if (input.one_off && cdbm_is_over(player, input.one_off)) input.one_off = NULL;
         input.n_packet = cdbm_pack(player, state, packet), input.packet = packet;

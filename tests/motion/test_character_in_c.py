@@ -25,6 +25,7 @@ from contextdb.commands.motion_build_command import file_of
 from contextdb.compiled.c_header import c_header_of
 from contextdb.core import direction_of
 from contextdb.motion.markup.markup import Markup
+from contextdb.motion.markup.tag_filter import covers
 from contextdb.motion.output.bank import moving_alike
 from contextdb.motion.selection.chooser import N_DECISION
 from contextdb.motion.storage.bundle import Played, bundle_of
@@ -158,16 +159,40 @@ def drawn(rng, is_captured):
     return motion.Controller(motion.Selector(entries), settings), schema, banks, output
 
 
+def options_for(rng, database):
+    """What a match node is given beside its target, at random: what Python takes, and what C is given for it."""
+    options, ways, costs, penalty = {}, [0, 0, 0], [rng.choice([0.0, 0.5, 3.0]) for _ in EVENTS], (-1, 0.0)
+    known = [any(covers(tag, each) for each in database.marks.tags) for tag in EVENTS]
+    if rng.random() < 0.5:
+        ways = [rng.choice([0, 0, 1, 2, 3, 4, 5]) if is_known else 0 for is_known in known]
+        of = [[tag for tag, own in zip(EVENTS, ways, strict=True) if own == way] for way in range(6)]
+        soft = [{tag: costs[EVENTS.index(tag)] for tag in each} for each in of[4:]]
+        options["tags"] = motion.TagFilter(*of[1:4], *soft)
+    if rng.random() < 0.3:
+        penalty = rng.randrange(len(database.assets)), rng.choice([0.25, 4.0, math.inf])
+        options["penalties"] = {database.assets[penalty[0]]: penalty[1]}
+    has_frames = not any(ways) and rng.random() < 0.2
+    if has_frames:
+        options["tags"] = np.arange(database.n_frames) % 3 != 0
+    return options, (*ways, *costs, *penalty, has_frames)
+
+
 def entered(rng, one, stick, gait, nodes):
-    """A one-off that a match node gives a character for a target, None where nothing may play, and what C is given for it."""
+    """A one-off that a match node gives a character, None where nothing may play, and what C is given for it."""
     name = rng.choice(list(nodes))
     node, turn = nodes[name], rng.choice([None, rng.uniform(-4.0, 4.0)])
     target = motion.Target(rng.uniform(-2.0, 2.0), rng.uniform(-1.0, 4.0), turn)
     facts = {"gait": gait, "direction": direction_of(*stick, one.body.heading)}
-    play = node.enter(one.features(), target, one.tables.query(facts))
+    options, numbers = options_for(rng, node.database)
+    stitched = (rng.randrange(node.database.n_frames), rng.choice([1.0, 8.0, 60.0])) if rng.random() < 0.4 else (-1, 0.0)
+    valid = one.tables.query(facts)
+    if stitched[0] < 0:
+        play = node.enter(one.features(), target, valid, **options)
+    else:
+        play = node.stitch(one.features(), node.database.raw(stitched[0]), stitched[1], valid, **options)
     weights = node.position_weight, node.rotation_weight
-    given = list(nodes).index(name), target.left_m, target.ahead_m, math.nan if turn is None else turn, *weights
-    return None if play is None else motion.OneOff(one, play, name), given
+    aimed = list(nodes).index(name), target.left_m, target.ahead_m, math.nan if turn is None else turn, *weights
+    return None if play is None else motion.OneOff(one, play, name), (*aimed, *numbers, *stitched)
 
 
 def session(rng, n_ticks, is_captured=False):
@@ -196,7 +221,7 @@ def session(rng, n_ticks, is_captured=False):
             is_going_on = events[i] is not None and left_s > 0.0
             events[i] = (name, max(left_s - dt, 0.0)) if is_going_on or rng.random() < 0.04 else None
         gaits = ["Idle" if not math.hypot(*stick) else "Walk" if math.hypot(*stick) < 2.0 else "Run" for stick in sticks]
-        entering = [i for i in range(n) if once[i] is None and rng.random() < 0.03]
+        entering = [i for i in range(n) if once[i] is None and rng.random() < 0.08]
         entries = [(i, *entered(rng, members[i], sticks[i], gaits[i], nodes)) for i in entering]
         for i, one, _ in entries:
             once[i] = one
@@ -214,7 +239,7 @@ def session(rng, n_ticks, is_captured=False):
             number = CONDITIONS["gait"]["values"].index(updated.facts["gait"])
             event_number, in_s = (-1, 0.0) if event is None else (EVENTS.index(event[0]), event[1])
             given.append(struct.pack("3dqqd", *stick, facing, number, event_number, in_s))
-        given += [struct.pack("7d", i, *numbers) for i, _, numbers in entries]
+        given += [struct.pack("18d", i, *numbers) for i, _, numbers in entries]
         states = b"".join(one.state for one in crowd)
         poses = [updated.pose for updated in updates]
         numbers = [(np.array(pose.root), pose.rotations, pose.translations, pose.positions) for pose in poses]

@@ -25,7 +25,7 @@ from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.events import events_of
 
 MAGIC = b"CDBMOTN1"
-DATABASE, BANK, CONTROLLER, TABLE = 1, 40, 60, 90
+DATABASE, BANK, CONTROLLER, TABLE, TAGS = 1, 40, 60, 90, 110
 """The first kinds of the parts of each."""
 OUTPUT = (
     "blend", "halflife_s", "root", "position_weight", "rotation_weight", "position_pull_s", "rotation_pull_s",
@@ -157,6 +157,7 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
     texts = _texts(database.assets), *rows, _texts([name])
     levels, events = _levels(database), _events(database)
     bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, *texts, *levels, *events, *nodes])
+    bundle.add(TAGS, number, [_texts(database.marks.tags), database.marks.kind_tags])
     if bank is not None:
         *frames, bank_rate = bank.frame_parts(bank.steps)
         bundle.add(BANK, number, [*frames, np.array([bank_rate])])

@@ -148,6 +148,27 @@ def warp(
 def row_at(times: NDArray[np.float64], rows: NDArray[np.float64], time_s: float, to: NDArray[np.float64], /) -> None:
     """Write the row between two times."""
 
+def see_others(places: NDArray[np.float64], others: NDArray[np.float64], seen: NDArray[np.float64], /) -> None:
+    """Write what bodies at places [n, 3] see of others, in the units of costs: [n, 4]."""
+
+def align(
+    recorded: NDArray[np.float64], places: NDArray[np.float64], gives: NDArray[np.float64], put: NDArray[np.float64], /
+) -> None:
+    """Write where a clip that was recorded at places [K, 3] has its actors when it is put down best for others [K, 3]."""
+
+def begin_roles(
+    controllers: Controllers,
+    ranges: NDArray[np.int64],
+    frame: int,
+    warps: NDArray[np.float64],
+    put: NDArray[np.float64],
+    starts: NDArray[np.float64],
+    targets: NDArray[np.float64],
+    /,
+) -> tuple[int, float, float]:
+    """The last frame of the first role of a joint clip that is entered at a frame, and from when to when its actors are brought
+    together; writes where each, as he sees it, is to be then: [K, 3]."""
+
 def write_ends(controllers: Controllers, warps: NDArray[np.float64], ends: NDArray[np.float64], /) -> None:
     """Write where each frame's animation brings the body by itself, float64 [N, 3], by the warp ranges [R, 2, 2]; of the one
     database of the controllers, as all of these."""

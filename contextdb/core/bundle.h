@@ -21,7 +21,12 @@ enum {  /* kinds of parts; of a database, of a bank, of a controller, of a table
     CDBM_P_KIND_BIASES, CDBM_P_STEPS, CDBM_P_FEATURES, CDBM_P_VELOCITIES, CDBM_P_OUTPUT, CDBM_P_PARENTS, CDBM_P_OFFSETS, CDBM_P_PLACES,
     CDBM_P_LEGS, CDBM_P_HINGES, CDBM_P_TOPS, CDBM_P_SPINE, CDBM_P_LEFT, CDBM_P_JOINTS, CDBM_P_CONTROLLER_NAME, CDBM_P_JOINT_NAMES,
     CDBM_P_TABLE = 90, CDBM_P_TABLE_NAME, CDBM_P_OWN_FACTS, CDBM_P_MIRROR,
-    CDBM_P_TAGS = 110, CDBM_P_KIND_TAGS
+    CDBM_P_TAGS = 110, CDBM_P_KIND_TAGS,
+    CDBM_P_MORE = 120,              /* of a controller: databases that its characters have poses of, as its entries; it does not search them */
+    CDBM_P_ROLES = 130, CDBM_P_ROLE_RANGES, CDBM_P_JOINT_BOXES, CDBM_P_JOINT_RANGES, CDBM_P_JOINT_FIRSTS, CDBM_P_JOINT_LOWS, CDBM_P_JOINT_HIGHS,
+    CDBM_P_SEEN, CDBM_P_SEEN_LOWS, CDBM_P_SEEN_HIGHS, CDBM_P_PAIRS, CDBM_P_JOINT_WEIGHTS, CDBM_P_SEEN_WEIGHTS, CDBM_P_JOINT_BIASES,
+    CDBM_P_JOINT_KIND_BIASES, CDBM_P_JOINT_ALLOWED, CDBM_P_JOINT_WARPS, CDBM_P_JOINT_MIRRORED, CDBM_P_JOINT_ROW_STARTS, CDBM_P_JOINT_ROWS,
+    CDBM_P_SET = 160, CDBM_P_SET_DATABASES, CDBM_P_SET_THRESHOLDS /* joint databases that are searched together, and its name */
 };
 
 typedef struct cdbm_part_entry { uint32_t kind, number; uint64_t at, n_bytes; } cdbm_part_entry;

@@ -10,3 +10,4 @@
 #include "walk.h"
 #include "tags.h"
 #include "nodes.h"
+#include "meeting.h"

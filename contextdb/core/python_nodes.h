@@ -280,7 +280,82 @@ static PyObject *cdbp_filter_kinds(PyObject *module, PyObject *const *in, Py_ssi
     return NULL;
 }
 
+/* ---- clips of several characters: see meeting.h */
+
+/* see_others(places, others, seen): each place as another body sees it. */
+static PyObject *cdbp_see_others(PyObject *module, PyObject *const *in, Py_ssize_t n)
+{
+    cdbp_arrays a;
+    const double *places, *others;
+    double *seen;
+    size_t s[3], n_rows = 0, i;
+    int is_done = 0;
+    (void)module;
+    a.n = 0;
+    if (n == 3 && (places = cdbp_numbers(&a, in[0], s, 2, CDBP_ANY, 3, 0)) && ((n_rows = s[0]), 1) && (others = cdbp_numbers(&a, in[1], s, 2, n_rows, 3, 0))
+        && (seen = cdbp_to_numbers(&a, in[2], s, 2, n_rows, 4, 0))) {
+        for (i = 0; i < n_rows; i++) cdbm_see_other(places + 3 * i, others + 3 * i, seen + 4 * i);
+        is_done = 1;
+    }
+    return cdbp_given_back(&a, is_done, "see_others takes two arrays of places, and one for what is seen");
+}
+
+/* align(recorded, places, gives, put) */
+static PyObject *cdbp_align(PyObject *module, PyObject *const *in, Py_ssize_t n)
+{
+    cdbp_arrays a;
+    const double *recorded, *places, *gives;
+    double *put;
+    size_t s[3], n_roles = 0;
+    int is_done = 0;
+    (void)module;
+    a.n = 0;
+    if (n == 4 && (recorded = cdbp_numbers(&a, in[0], s, 2, CDBP_ANY, 3, 0)) && ((n_roles = s[0]), 1) && (places = cdbp_numbers(&a, in[1], s, 2, n_roles, 3, 0))
+        && (gives = cdbp_numbers(&a, in[2], s, 1, n_roles, 0, 0)) && (put = cdbp_to_numbers(&a, in[3], s, 2, n_roles, 3, 0))) {
+        cdbm_align(recorded, places, gives, n_roles, put);
+        is_done = 1;
+    }
+    return cdbp_given_back(&a, is_done, "align takes two arrays of places, numbers, and an array for places");
+}
+
+/* begin_roles(controllers, ranges, frame, warps, put, starts, targets): the last frame of the first role, and from when to when the actors
+ * are brought together. */
+static PyObject *cdbp_begin_roles(PyObject *module, PyObject *const *in, Py_ssize_t n)
+{
+    const cdbm_clips *clips = n == 7 ? cdbp_node_clips(in[0]) : NULL;
+    cdbp_arrays a;
+    const int64_t *ranges;
+    const double *warps, *put, *starts;
+    double *targets;
+    cdbm_one_off *roles = NULL, first;
+    int64_t frame;
+    size_t s[3], n_roles = 0, k;
+    int is_done = 0;
+    (void)module;
+    a.n = 0;
+    if (clips && (ranges = cdbp_int64s(&a, in[1], s, 1, CDBP_ANY, 0)) && (n_roles = s[0]) > 0 && cdbp_int_of(in[2], &frame)
+        && (warps = cdbp_numbers(&a, in[3], s, 3, clips->n_ranges, 2, 2)) && (put = cdbp_numbers(&a, in[4], s, 2, n_roles, 3, 0))
+        && (starts = cdbp_numbers(&a, in[5], s, 2, n_roles, 3, 0)) && (targets = cdbp_to_numbers(&a, in[6], s, 2, n_roles, 3, 0))) {
+        is_done = cdbm_are_below(ranges, n_roles, clips->n_ranges) && frame >= 0 && frame < (int64_t)clips->frames->n_frames;
+        for (k = 0; is_done && k < n_roles; k++) is_done = cdbp_is_in_range(clips, ranges[k], clips->starts[ranges[k]] + frame);
+        if (is_done && !(roles = (cdbm_one_off *)PyMem_Calloc(n_roles, sizeof *roles))) is_done = PyErr_NoMemory() != NULL;
+    }
+    if (is_done) {
+        cdbm_begin_roles(clips, ranges, n_roles, frame, warps, put, starts, roles);
+        for (k = 0; k < n_roles; k++) memcpy(targets + 3 * k, &roles[k].target, 3 * sizeof(double));
+        first = roles[0];
+    }
+    PyMem_Free(roles);
+    cdbp_release(&a);
+    if (is_done) return Py_BuildValue("(Ldd)", (long long)first.last, first.windows[0].from_s, first.windows[0].to_s);
+    if (!PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "begin_roles takes controllers, ranges, a frame, warps, and three arrays of places");
+    return NULL;
+}
+
 #define CDBP_NODE_FUNCTIONS \
+    {"see_others", CDBP_CALL(cdbp_see_others), METH_FASTCALL, "Write what bodies see of each other."}, \
+    {"align", CDBP_CALL(cdbp_align), METH_FASTCALL, "Write where a clip has its actors, put down best."}, \
+    {"begin_roles", CDBP_CALL(cdbp_begin_roles), METH_FASTCALL, "How the actors of a clip come to be as recorded."}, \
     {"write_ends", CDBP_CALL(cdbp_write_ends), METH_FASTCALL, "Write where each frame's animation ends."}, \
     {"begin_one_off", CDBP_CALL(cdbp_begin_one_off), METH_FASTCALL, "How far a one-off plays, and how fast."}, \
     {"forbid_others", CDBP_CALL(cdbp_forbid_others), METH_FASTCALL, "Forbid all frames but those that rows name."}, \

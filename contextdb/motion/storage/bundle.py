@@ -22,7 +22,7 @@ from contextdb.motion.joint.boxes import boxes_of
 from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.joint.searcher import JointSearcher
 from contextdb.motion.output.bank import PoseBank, moving_alike
-from contextdb.motion.output.pipeline import numbers_of, rig_parts
+from contextdb.motion.output.pipeline import Pipeline, numbers_of, rig_parts
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.chooser import Chooser
@@ -168,6 +168,9 @@ def _check(players: Mapping[str, Played], searchers: Mapping[str, JointSearcher]
         ]
     if faults:
         raise MotionError(*faults)
+    for player in players.values():
+        if player.banks:
+            Pipeline(moving_alike(player.banks), player.output)  # refuses banks of different rigs
 
 
 def _add_joint(

@@ -281,11 +281,12 @@ def bundled(tables: Mapping[str, Table], config: MotionConfig, databases: Mappin
     for name in config.controllers:
         names = config.databases_of(config.selector_of(name))
         schema = config.features[config.databases[names[0]].features]
-        own = {each: banks[each] for each in names if each in banks}
-        ends = {each: MatchNode(databases[each]).ends for each in own}
+        own = {each: banks[each] for each in config.played_by(name) if each in banks}
+        ends = {each: MatchNode(databases[each]).ends for each in names if each in own}
         controller = config.controller(name, databases, rng=Random(0))
         players[name] = Played(controller, schema, own or None, config.output_of(name), ends)
-    return bundle_of(players, table_of, compiled)
+    joint = dict.fromkeys(each for names in config.joint_clips.values() for each in names)
+    return bundle_of(players, table_of, compiled, {each: config.joint_searcher(each, databases) for each in joint})
 
 
 def file_of(name: str, table: CompiledTable) -> TableFile:

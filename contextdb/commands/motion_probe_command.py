@@ -77,7 +77,7 @@ class Probe:
 
 def run(arguments: argparse.Namespace) -> ExitCode:
     """Drive, measure and report."""
-    stage = Stage.of(arguments.path, lambda config: config.databases_of(config.selector_of(arguments.controller)))
+    stage = Stage.of(arguments.path, lambda config: config.played_by(arguments.controller))
     character = character_of(stage, arguments.controller, unknown="any")
     if character.stream is None:
         raise ContextDBError(Fault("there is no clip that the character could play.", "a database with a clip"))

@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     """Run a controller along a stick."""
     out = _out_file(Path(arguments.out), Path(arguments.stick))
     poses_out = _pose_file(arguments)
-    stage = Stage.of(arguments.path, lambda config: config.databases_of(config.selector_of(arguments.controller)))
+    stage = Stage.of(arguments.path, lambda config: config.played_by(arguments.controller))
     character = character_of(stage, arguments.controller, arguments.seed, arguments.unknown)
     trace = character.record(arguments.k)
     say_where(trace, stage, arguments.controller, out)
@@ -136,7 +136,8 @@ def character_of(stage: Stage, name: str, seed: int = 0, unknown: Unknown = "err
     controller = stage.config.controller(name, stage.databases, rng=random.Random(seed))
     names = list(controller.selector.names)
     assets = {table: leaf_assets(stage.project[table]) for table in stage.project.tables}
-    banks = banks_of(stage.config, stage.folder, assets, controller.selector.databases)
+    joint = {each: stage.databases[each] for each in stage.config.joint_databases_of(name)}
+    banks = banks_of(stage.config, stage.folder, assets, {**controller.selector.databases, **joint})
     tables = stage.tables(names)
     table_of = {each: tables[table] for each in names if (table := stage.config.databases[each].table) is not None}
     stream = None if banks is None else motion.PoseStream(banks, stage.config.output_of(name))

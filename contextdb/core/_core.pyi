@@ -148,6 +148,61 @@ def warp(
 def row_at(times: NDArray[np.float64], rows: NDArray[np.float64], time_s: float, to: NDArray[np.float64], /) -> None:
     """Write the row between two times."""
 
+def see_others(places: NDArray[np.float64], others: NDArray[np.float64], seen: NDArray[np.float64], /) -> None:
+    """Write what bodies at places [n, 3] see of others, in the units of costs: [n, 4]."""
+
+def align(
+    recorded: NDArray[np.float64], places: NDArray[np.float64], gives: NDArray[np.float64], put: NDArray[np.float64], /
+) -> None:
+    """Write where a clip that was recorded at places [K, 3] has its actors when it is put down best for others [K, 3]."""
+
+def begin_roles(
+    controllers: Controllers,
+    ranges: NDArray[np.int64],
+    frame: int,
+    warps: NDArray[np.float64],
+    put: NDArray[np.float64],
+    starts: NDArray[np.float64],
+    targets: NDArray[np.float64],
+    /,
+) -> tuple[int, float, float]:
+    """The last frame of the first role of a joint clip that is entered at a frame, and from when to when its actors are brought
+    together; writes where each, as he sees it, is to be then: [K, 3]."""
+
+def write_ends(controllers: Controllers, warps: NDArray[np.float64], ends: NDArray[np.float64], /) -> None:
+    """Write where each frame's animation brings the body by itself, float64 [N, 3], by the warp ranges [R, 2, 2]; of the one
+    database of the controllers, as all of these."""
+
+def begin_one_off(
+    controllers: Controllers,
+    at: int,
+    frame: int,
+    last: int,
+    play: NDArray[np.float64] | None,
+    warps: NDArray[np.float64],
+    target: NDArray[np.float64],
+    windows: NDArray[np.float64],
+    /,
+) -> tuple[int, float]:
+    """The last frame and the play rate of the range `at` that is entered at a frame, as its row says that it plays [8]; writes its
+    warp windows [2, 2]. With a last frame, else -1, it plays up to there as it is, and its target is written."""
+
+def forbid_others(
+    controllers: Controllers, plays: NDArray[np.float64], play_of: NDArray[np.int64], biases: NDArray[np.float64], /
+) -> None:
+    """Make the biases of frames [N] infinite but for those at which rows say that they are entered; `play_of` [R] is the row of
+    each range, -1 for none."""
+
+def shortest_part(controllers: Controllers, *question: NDArray[Any] | float | None) -> tuple[int, int, float] | None:
+    """shortest_part(controllers, query, ranges, range_biases, allowed, kind_biases, playable, flags, frame_biases, after,
+    most_cost): the first and the last frame, -1 for none, of the shortest part that joins two poses, and its cost; None for a
+    query that cannot be compared."""
+
+def filter_kinds(*arguments: bytes | NDArray[Any]) -> bool:
+    """filter_kinds(known, flags, include, every, exclude, prefer, prefer_costs, avoid, avoid_costs, passes, added): which kinds of
+    frames [K] tags let pass, and what they add to their costs, into the last two; whether the markup knows all of them. Tags are
+    texts one after another, each ended by 0; `flags` bool [K, T] are those that kinds have."""
+
 def aim(
     ends: NDArray[np.float64],
     target: NDArray[np.float64],

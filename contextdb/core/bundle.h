@@ -20,7 +20,13 @@ enum {  /* kinds of parts; of a database, of a bank, of a controller, of a table
     CDBM_P_ENTRIES = 60, CDBM_P_SETTINGS, CDBM_P_THRESHOLDS, CDBM_P_BARS, CDBM_P_RANGE_BIASES, CDBM_P_ALLOWED, CDBM_P_PLAYABLE,
     CDBM_P_KIND_BIASES, CDBM_P_STEPS, CDBM_P_FEATURES, CDBM_P_VELOCITIES, CDBM_P_OUTPUT, CDBM_P_PARENTS, CDBM_P_OFFSETS, CDBM_P_PLACES,
     CDBM_P_LEGS, CDBM_P_HINGES, CDBM_P_TOPS, CDBM_P_SPINE, CDBM_P_LEFT, CDBM_P_JOINTS, CDBM_P_CONTROLLER_NAME, CDBM_P_JOINT_NAMES,
-    CDBM_P_TABLE = 90, CDBM_P_TABLE_NAME, CDBM_P_OWN_FACTS, CDBM_P_MIRROR
+    CDBM_P_TABLE = 90, CDBM_P_TABLE_NAME, CDBM_P_OWN_FACTS, CDBM_P_MIRROR,
+    CDBM_P_TAGS = 110, CDBM_P_KIND_TAGS,
+    CDBM_P_MORE = 120,              /* of a controller: databases that its characters have poses of, as its entries; it does not search them */
+    CDBM_P_ROLES = 130, CDBM_P_ROLE_RANGES, CDBM_P_JOINT_BOXES, CDBM_P_JOINT_RANGES, CDBM_P_JOINT_FIRSTS, CDBM_P_JOINT_LOWS, CDBM_P_JOINT_HIGHS,
+    CDBM_P_SEEN, CDBM_P_SEEN_LOWS, CDBM_P_SEEN_HIGHS, CDBM_P_PAIRS, CDBM_P_JOINT_WEIGHTS, CDBM_P_SEEN_WEIGHTS, CDBM_P_JOINT_BIASES,
+    CDBM_P_JOINT_KIND_BIASES, CDBM_P_JOINT_ALLOWED, CDBM_P_JOINT_WARPS, CDBM_P_JOINT_MIRRORED, CDBM_P_JOINT_ROW_STARTS, CDBM_P_JOINT_ROWS,
+    CDBM_P_SET = 160, CDBM_P_SET_DATABASES, CDBM_P_SET_THRESHOLDS /* joint databases that are searched together, and its name */
 };
 
 typedef struct cdbm_part_entry { uint32_t kind, number; uint64_t at, n_bytes; } cdbm_part_entry;
@@ -112,6 +118,15 @@ static inline const char *cdbm_text(const cdbm_bundle *bundle, uint32_t kind, si
     return at < n ? texts + at : NULL;
 }
 
+/* The text behind one that cdbm_text gave; NULL behind the last. */
+static inline const char *cdbm_next_text(const cdbm_bundle *bundle, uint32_t kind, size_t number, const char *text)
+{
+    size_t n;
+    const char *texts = (const char *)cdbm_find(bundle, kind, number, 1, &n);
+    text += strlen(text) + 1;
+    return text < texts + n ? text : NULL;
+}
+
 /* How many things there are that have a part of a kind. */
 static inline size_t cdbm_count(const cdbm_bundle *bundle, uint32_t kind)
 {
@@ -194,6 +209,19 @@ static inline void cdbm_read_database(cdbm_bundle *bundle, size_t number, cdbm_f
     if (!cdbm_is_whole(frames) || !cdbm_are_clips(clips, n_all) || !cdbm_are_boxes_in_ranges(clips))
         cdbm_refuse(bundle, "the boxes, ranges, channels or kinds of a database do not go together");
     else cdbm_read_levels(bundle, number, frames);
+}
+
+/* The tags that the markup of a database knows; none where the bundle has none. */
+static inline void cdbm_read_tags(cdbm_bundle *bundle, size_t number, size_t n_kinds, cdbm_tag_list *to)
+{
+    size_t n, i;
+    memset(to, 0, sizeof *to);
+    to->n_kinds = n_kinds;
+    to->names = (const char *)cdbm_find(bundle, CDBM_P_TAGS, number, 1, &n);
+    if (bundle->why || !to->names || n == 0) return;
+    if (to->names[n - 1] != 0) cdbm_refuse(bundle, "the tags of a database are no texts");
+    for (i = 0; i < n; i++) to->n += to->names[i] == 0;
+    to->flags = CDBM_TAKE(uint8_t, CDBM_P_KIND_TAGS, n_kinds * to->n);
 }
 
 /* ---- banks of poses */

@@ -26,13 +26,15 @@ typedef struct cdbm_player {
     cdbm_events events[CDBM_MOST_DATABASES];
     const int64_t *pose_ranges[CDBM_MOST_DATABASES]; /* [R] the range of poses of each range */
     const double *warps[CDBM_MOST_DATABASES], *ends[CDBM_MOST_DATABASES]; /* [R, 2, 2] and [N, 3], for match nodes; or NULL */
+    cdbm_tag_list tags[CDBM_MOST_DATABASES];
+    cdbm_joint_clips joints[CDBM_MOST_DATABASES]; /* of databases behind those of the controller, which it does not search */
     cdbm_ways ways;
     cdbo_poses poses;
     cdbo_frames banks[CDBM_MOST_DATABASES];
     const cdbo_frames *bank_list[CDBM_MOST_DATABASES];
     const double *range_biases, *kind_biases;
     const uint8_t *allowed, *playable;
-    size_t n_ranges, n_kinds, n_frames;
+    size_t n_databases, n_ranges, n_kinds, n_frames; /* n_databases: with those that the controller does not search */
     double velocity_halflife_s, heading_halflife_s;
     int has_poses, has_costs;
     cdb_any *opened[CDBM_MOST_TABLES];
@@ -81,10 +83,10 @@ typedef struct cdbm_pose {          /* where an update writes; cdbm_lay_out give
 static inline void cdbm_close_player(cdbm_player *player)
 {
     size_t i;
-    for (i = 0; i < player->controller.n_databases; i++) cdbm_free_levels(&player->frames[i]);
+    for (i = 0; i < player->n_databases; i++) cdbm_free_levels(&player->frames[i]);
     for (i = 0; i < player->n_tables; i++) cdb_close_any(player->opened[i]);
     CDB_FREE(player->plays);
-    player->controller.n_databases = player->n_tables = 0, player->plays = NULL;
+    player->controller.n_databases = player->n_databases = player->n_tables = 0, player->plays = NULL;
 }
 
 /* Open the tables, and put together how their rows play. */
@@ -110,59 +112,34 @@ static inline void cdbm_read_tables(cdbm_bundle *bundle, cdbm_player *player)
             memcpy(player->plays + player->plays_at[i], player->opened[i]->table.plays, (player->opened[i]->table.n_rows + 1) * sizeof(cdb_row_play));
 }
 
-/* Which rows name the ranges of a database. */
-static inline void cdbm_read_rows(cdbm_bundle *bundle, size_t number, size_t n_ranges, size_t n_table_rows, cdbm_table_ranges *of)
+/* The longest range that a one-off may play. */
+static inline void cdbm_find_longest(cdbm_player *player, const cdbm_clips *clips)
 {
-    size_t n_rows = 0, i;
-    memset(of, 0, sizeof *of);
-    of->n_ranges = n_ranges;
-    of->starts = CDBM_TAKE(int64_t, CDBM_P_ROW_STARTS, n_ranges + 1), of->rows = CDBM_TAKE_ALL(int64_t, CDBM_P_ROWS, &n_rows);
-    of->mirrored = CDBM_TAKE(uint8_t, CDBM_P_MIRRORED, n_ranges);
-    if (bundle->why) return;
-    if (of->starts[0] != 0 || (uint64_t)of->starts[n_ranges] != n_rows) cdbm_refuse(bundle, "the rows of a table do not go together");
-    for (i = 0; i < n_ranges; i++)
-        if (of->starts[i] > of->starts[i + 1] || of->starts[i] < 0 || of->mirrored[i] > 1)
-            cdbm_refuse(bundle, "the rows of a table do not go together");
-    for (i = 0; i < n_rows; i++)
-        if (of->rows[i] < 0 || (uint64_t)of->rows[i] >= n_table_rows) cdbm_refuse(bundle, "a row of a table is not there");
-}
-
-/* What match nodes know of a database, where there is any. */
-static inline void cdbm_read_ends(cdbm_bundle *bundle, size_t number, size_t at, cdbm_player *player)
-{
-    const cdbm_clips *clips = &player->clips[at];
-    size_t n, r;
-    if (!cdbm_find(bundle, CDBM_P_ENDS, number, 1, &n)) return;
-    player->ends[at] = CDBM_TAKE(double, CDBM_P_ENDS, 3 * clips->frames->n_frames);
-    player->warps[at] = CDBM_TAKE(double, CDBM_P_WARPS, 4 * clips->n_ranges);
-    if (!clips->root) cdbm_refuse(bundle, "a database for match nodes does not say where its clips go");
+    size_t r;
     for (r = 0; r < clips->n_ranges; r++) {
         size_t length = (size_t)(clips->stops[r] - clips->starts[r]);
         if (length > player->n_longest) player->n_longest = length;
     }
 }
 
-static inline void cdbm_read_entry(cdbm_bundle *bundle, cdbm_player *player, size_t i, const int64_t *entry, double threshold, double bar)
+/* What match nodes know of a database, where there is any. */
+static inline void cdbm_read_ends(cdbm_bundle *bundle, size_t number, size_t at, cdbm_player *player)
 {
-    cdbm_clips *clips = &player->clips[i];
+    const cdbm_clips *clips = &player->clips[at];
+    size_t n;
+    if (!cdbm_find(bundle, CDBM_P_ENDS, number, 1, &n)) return;
+    player->ends[at] = CDBM_TAKE(double, CDBM_P_ENDS, 3 * clips->frames->n_frames);
+    player->warps[at] = CDBM_TAKE(double, CDBM_P_WARPS, 4 * clips->n_ranges);
+    if (!clips->root) cdbm_refuse(bundle, "a database for match nodes does not say where its clips go");
+    cdbm_find_longest(player, clips);
+}
+
+/* The poses of a database. */
+static inline void cdbm_read_poses(cdbm_bundle *bundle, cdbm_player *player, size_t i, const int64_t *entry)
+{
+    const cdbm_clips *clips = &player->clips[i];
     size_t number = (size_t)entry[0], r;
     cdbo_frames *bank;
-    cdbm_read_database(bundle, number, &player->frames[i], clips);
-    clips->threshold = threshold, clips->bar = bar;
-    clips->range_at = player->n_ranges, clips->kind_at = player->n_kinds, clips->frame_at = player->n_frames;
-    player->database_of[i] = entry[0], player->table_of[i] = entry[2];
-    if (bundle->why) return;
-    if (i == 0) player->controller.n_features = clips->frames->n_features;
-    if (clips->frames->n_features != player->controller.n_features) cdbm_refuse(bundle, "two databases have other features");
-    player->n_ranges += clips->n_ranges, player->n_kinds += clips->n_kinds, player->n_frames += clips->frames->n_frames;
-    cdbm_read_events(bundle, number, clips->frames->n_frames, &player->events[i]);
-    if (entry[2] >= (int64_t)player->n_tables) cdbm_refuse(bundle, "a database has a table that is not there");
-    else if (entry[2] >= 0) {
-        cdbm_read_rows(bundle, number, clips->n_ranges, player->opened[entry[2]]->table.n_rows, &player->tables[i]);
-        player->tables[i].plays = player->opened[entry[2]]->table.plays;
-    }
-    player->tables[i].at = clips->range_at;
-    cdbm_read_ends(bundle, number, i, player);
     if (!player->has_poses || entry[1] < 0) {
         if (player->has_poses && clips->n_ranges > 0) cdbm_refuse(bundle, "a database has no poses");
         return;
@@ -174,6 +151,40 @@ static inline void cdbm_read_entry(cdbm_bundle *bundle, cdbm_player *player, siz
         if (player->pose_ranges[i][r] < 0 || (uint64_t)player->pose_ranges[i][r] >= bank->n_ranges) cdbm_refuse(bundle, "a clip has no poses");
     player->bank_of[i] = (int64_t)player->poses.n_banks;
     player->bank_list[player->poses.n_banks++] = bank;
+}
+
+/* A database of the controller, or another one behind those. */
+static inline void cdbm_read_entry(cdbm_bundle *bundle, cdbm_player *player, size_t i, const int64_t *entry)
+{
+    static const uint32_t rows[] = {CDBM_P_MIRRORED, CDBM_P_ROW_STARTS, CDBM_P_ROWS};
+    cdbm_clips *clips = &player->clips[i];
+    size_t number = (size_t)entry[0], n_rows = 0;
+    int is_searched = i < player->controller.n_databases;
+    cdbm_read_database(bundle, number, &player->frames[i], clips);
+    player->database_of[i] = entry[0], player->table_of[i] = entry[2];
+    if (bundle->why) return;
+    if (!(clips->rate <= 1e6)) cdbm_refuse(bundle, "the rate of a database is none");
+    if (entry[2] >= (int64_t)player->n_tables) cdbm_refuse(bundle, "a database has a table that is not there");
+    else if (entry[2] >= 0) n_rows = player->opened[entry[2]]->table.n_rows;
+    if (bundle->why) return;
+    cdbm_read_tags(bundle, number, clips->n_kinds, &player->tags[i]);
+    if (!is_searched) {
+        cdbm_read_joint(bundle, number, clips, n_rows, &player->joints[i]);
+        if (clips->root) cdbm_find_longest(player, clips);
+    } else {
+        if (i == 0) player->controller.n_features = clips->frames->n_features;
+        if (clips->frames->n_features != player->controller.n_features) cdbm_refuse(bundle, "two databases have other features");
+        clips->range_at = player->n_ranges, clips->kind_at = player->n_kinds, clips->frame_at = player->n_frames;
+        player->n_ranges += clips->n_ranges, player->n_kinds += clips->n_kinds, player->n_frames += clips->frames->n_frames;
+        cdbm_read_events(bundle, number, clips->frames->n_frames, &player->events[i]);
+        if (entry[2] >= 0) {
+            cdbm_read_rows_of(bundle, number, rows, clips->n_ranges, n_rows, &player->tables[i]);
+            player->tables[i].plays = player->opened[entry[2]]->table.plays;
+        }
+        player->tables[i].at = clips->range_at;
+        cdbm_read_ends(bundle, number, i, player);
+    }
+    cdbm_read_poses(bundle, player, i, entry);
 }
 
 static inline void cdbm_read_output(cdbm_bundle *bundle, size_t number, cdbm_player *player)
@@ -192,8 +203,8 @@ static inline const char *cdbm_open_player(cdbm_player *player, const cdbm_bundl
 {
     cdbm_bundle *bundle = &player->bundle;
     cdbm_controller *to = &player->controller;
-    size_t number = 0, n_entries = 0, n_settings = 0, i;
-    const int64_t *entries;
+    size_t number = 0, n_entries = 0, n_more = 0, n_settings = 0, i;
+    const int64_t *entries, *more;
     const double *settings, *thresholds, *bars;
     const char *own;
     memset(player, 0, sizeof *player);
@@ -203,9 +214,11 @@ static inline const char *cdbm_open_player(cdbm_player *player, const cdbm_bundl
     if (!cdbm_text(bundle, CDBM_P_CONTROLLER_NAME, number, 0)) return "the bundle has no controller of that name";
     entries = CDBM_TAKE_ALL(int64_t, CDBM_P_ENTRIES, &n_entries);
     settings = CDBM_TAKE_ALL(double, CDBM_P_SETTINGS, &n_settings);
-    if (n_entries % 3 || n_entries == 0 || n_entries / 3 > CDBM_MOST_DATABASES || n_settings != 13) cdbm_refuse(bundle, "a controller is damaged");
+    more = (const int64_t *)cdbm_find(bundle, CDBM_P_MORE, number, 3 * sizeof(int64_t), &n_more);
+    if (n_entries % 3 || n_entries == 0 || n_settings != 13) cdbm_refuse(bundle, "a controller is damaged");
+    n_entries /= 3, n_more = more ? n_more : 0;
+    if (n_entries > CDBM_MOST_DATABASES || n_more > CDBM_MOST_DATABASES - n_entries) cdbm_refuse(bundle, "a controller has more databases than can be read");
     if (bundle->why) return bundle->why;
-    n_entries /= 3;
     thresholds = CDBM_TAKE(double, CDBM_P_THRESHOLDS, n_entries), bars = CDBM_TAKE(double, CDBM_P_BARS, n_entries);
     to->n_played = cdbm_size_from(settings[0]), to->search_every_s = settings[1], to->jump_threshold_s = settings[2];
     to->history_s = settings[3], to->min_rate = settings[4], to->max_rate = settings[5], to->grace_s = settings[6];
@@ -217,11 +230,11 @@ static inline const char *cdbm_open_player(cdbm_player *player, const cdbm_bundl
     if (to->n_played > 1024) cdbm_refuse(bundle, "a controller is damaged");
     cdbm_read_tables(bundle, player);
     if (player->has_poses && !bundle->why) cdbm_read_output(bundle, number, player);
-    to->databases = player->clips;
-    for (i = 0; !bundle->why && i < n_entries; i++) {
-        to->n_databases = i + 1;
-        cdbm_read_entry(bundle, player, i, entries + 3 * i, thresholds[i], bars[i]);
-        if (!bundle->why && !(player->clips[i].rate <= 1e6)) cdbm_refuse(bundle, "the rate of a database is none");
+    to->databases = player->clips, to->n_databases = bundle->why ? 0 : n_entries;
+    for (i = 0; !bundle->why && i < n_entries + n_more; i++) {
+        player->n_databases = i + 1;
+        cdbm_read_entry(bundle, player, i, i < n_entries ? entries + 3 * i : more + 3 * (i - n_entries));
+        if (i < n_entries) player->clips[i].threshold = thresholds[i], player->clips[i].bar = bars[i];
     }
     player->range_biases = CDBM_TAKE(double, CDBM_P_RANGE_BIASES, player->n_ranges);
     player->allowed = CDBM_TAKE(uint8_t, CDBM_P_ALLOWED, player->n_kinds), player->playable = CDBM_TAKE(uint8_t, CDBM_P_PLAYABLE, player->n_kinds);
@@ -531,6 +544,14 @@ static inline cdbo_instant cdbm_instant_of(const cdbm_player *player, const cdbm
     return at;
 }
 
+/* Whether a moment is of a database of the player, one that its controller does not search too. */
+static inline int cdbm_is_there(const cdbm_player *player, const cdbm_playing *playing)
+{
+    cdbm_controller all = player->controller;
+    all.n_databases = player->n_databases;
+    return cdbm_is_playing(&all, playing);
+}
+
 /* Where a one-off brings the body in an update. 1; 0 with too little room; -5 for one of another bundle. */
 static inline int cdbm_bring(const cdbm_player *player, const double *state, double dt_s, const cdbm_one_off *one, cdbo_body *body,
     cdbm_room room)
@@ -540,9 +561,10 @@ static inline int cdbm_bring(const cdbm_player *player, const double *state, dou
     double place[3], was[2];
     size_t k;
     entered.database = one->database, entered.range = one->range, entered.frame = one->frame, entered.at_s = one->time_s;
-    if (!(one->database >= 0.0) || !cdbm_is_playing(&player->controller, &entered) || !player->ends[(size_t)one->database]) return -5;
+    if (!(one->database >= 0.0) || !cdbm_is_there(player, &entered)) return -5;
+    if (!player->ends[(size_t)one->database] && player->joints[(size_t)one->database].joint.n_roles == 0) return -5;
     entered.frame = one->last;
-    if (!cdbm_is_playing(&player->controller, &entered) || !(one->last >= one->frame && one->rate > 0.0)) return -5;
+    if (!cdbm_is_there(player, &entered) || !(one->last >= one->frame && one->rate > 0.0)) return -5;
     if (!cdbm_path_of(&player->clips[(size_t)one->database], one, &path, room)) return 0;
     *body = ((const cdbm_walk *)(const void *)state)->body;
     memcpy(was, body->position, sizeof was);
@@ -792,7 +814,7 @@ static inline size_t cdbm_pack(const cdbm_player *player, const double *state, u
 /* The asset that plays; NULL for nothing. */
 static inline const char *cdbm_asset(const cdbm_player *player, const cdbm_playing *playing)
 {
-    if (!cdbm_is_playing(&player->controller, playing) || playing->database < 0.0) return NULL;
+    if (!cdbm_is_there(player, playing) || playing->database < 0.0) return NULL;
     return cdbm_text(&player->bundle, CDBM_P_ASSETS, (size_t)player->database_of[(size_t)playing->database], (size_t)playing->range);
 }
 
@@ -825,7 +847,7 @@ static inline const char *cdbm_action_name(const cdbm_decision *decision)
 /* What the markup says of the frame that plays: the flags of contextdb/motion/markup/marks.py. */
 static inline unsigned cdbm_marks_of(const cdbm_player *player, const cdbm_playing *playing)
 {
-    if (!cdbm_is_playing(&player->controller, playing) || playing->database < 0.0) return 0;
+    if (!cdbm_is_there(player, playing) || playing->database < 0.0) return 0;
     return cdbm_mark_of(&player->clips[(size_t)playing->database], (int64_t)playing->frame);
 }
 

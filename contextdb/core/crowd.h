@@ -8,6 +8,7 @@
  *   cdbm_event_one       what is to happen, and in how many seconds
  *   cdbm_restore_one     put one where it stood
  *   cdbm_enter_one       play a one-off that a match node chooses for a target
+ *   cdbm_meet_ones       play a clip of several roles that some of them are cast for
  *   cdbm_update_crowd    all of them
  *   cdbm_crowd_numbers, cdbm_crowd_text what came of it
  *
@@ -33,10 +34,29 @@ typedef struct cdbm_crowd {
     cdb_fault fault;
 } cdbm_crowd;
 
+#define CDBM_MOST_MEETING 8         /* so many characters of a crowd may be asked to play a clip together */
+
+/* How many bytes of room a meeting of so many takes. */
+static inline size_t cdbm_meeting_room(const cdbm_player *player, size_t n)
+{
+    size_t each = cdbm_rounded(player->controller.n_features * sizeof(double)) + sizeof(cdbm_actor), most = 0, set, t;
+    for (set = 0; cdbm_text(&player->bundle, CDBM_P_SET, set, 0); set++) {
+        size_t own = cdbm_together_room(player, set, n, n * CDB_MOST_ROLES);
+        if (own > most) most = own;
+    }
+    most += n * each + n * CDB_MOST_ROLES * sizeof(cdb_actor) * player->n_tables + 64;
+    for (t = 0; t < player->n_tables; t++) most += cdbm_rounded(player->opened[t]->schema.n_conditions * sizeof(cdb_fact)) + 16;
+    return most;
+}
+
 static inline size_t cdbm_crowd_room(const cdbm_player *player, size_t n)
 {
-    size_t one = cdbm_enter_room(player), all = cdbm_room_size(player, n);
-    return one > all ? one : all;
+    size_t rooms[3], most = 0, i;
+    rooms[0] = cdbm_enter_room(player), rooms[1] = cdbm_room_size(player, n);
+    rooms[2] = cdbm_meeting_room(player, n < CDBM_MOST_MEETING ? n : CDBM_MOST_MEETING);
+    for (i = 0; i < 3; i++)
+        if (rooms[i] > most) most = rooms[i];
+    return most;
 }
 
 /* Take all that n characters need out of room; 0 where there is too little. */
@@ -159,11 +179,75 @@ CDB_API double cdbm_enter_one(cdbm_crowd *crowd, size_t i, const char *database,
     double *state;
     if (i >= crowd->n || number < 0) return NAN;
     state = crowd->states + i * cdbm_state_width(&crowd->player);
-    match.database = (size_t)number, match.target = cdbm_seen_at(state, x, z, heading), match.query = NULL;
+    memset(&match, 0, sizeof match);
+    match.database = (size_t)number, match.target = cdbm_seen_at(state, x, z, heading);
     match.position_weight = match.rotation_weight = 1.0;
     if (cdbm_enter(&crowd->player, state, &crowd->inputs[i], &match, &one, crowd->room) != 1) return NAN;
     if (one.range >= 0.0 && one.cost <= most) crowd->one_offs[i] = one, crowd->inputs[i].one_off = &crowd->one_offs[i];
     return one.cost;
+}
+
+/* Ask a table with the facts of some characters: each is offered for each of some roles; facts of no role are those of the first. 0 with
+ * too little room. */
+static inline int cdbm_ask_of_all(const cdbm_crowd *crowd, size_t table, size_t set, const size_t *who, size_t n, cdbm_asked *to, cdbm_room *room)
+{
+    const cdb_any *any = crowd->player.opened[table];
+    const cdb_schema *schema = &any->schema;
+    size_t n_tables = crowd->player.n_tables, i, k;
+    cdb_fact *facts = (cdb_fact *)cdbm_part(room, schema->n_conditions * sizeof *facts);
+    cdb_actor *offers = (cdb_actor *)cdbm_part(room, n * CDB_MOST_ROLES * sizeof *offers);
+    const char *role;
+    if (!facts || !offers) return 0;
+    memcpy(facts, crowd->lists[who[0] * n_tables + table], schema->n_conditions * sizeof *facts);
+    to->facts = facts, to->offers = offers, to->n_offers = 0;
+    for (k = 0; (role = cdbm_role_name(&crowd->player, set, k)) != NULL; k++) {
+        int number = cdb_role_number(&any->table, role);
+        for (i = 0; i < schema->n_conditions; i++)
+            if (cdbi_is_of_role(schema->conditions[i].name, role, strlen(role))) facts[i] = cdbi_missing(&schema->conditions[i]);
+        for (i = 0; number >= 0 && i < n; i++) {
+            cdb_actor *offer = &offers[to->n_offers++];
+            offer->role = number, offer->id = (int64_t)i, offer->cost = cdb_missing_number(), offer->facts = crowd->lists[who[i] * n_tables + table];
+        }
+    }
+    return 1;
+}
+
+/* Let some characters, at most CDBM_MOST_MEETING, play a clip of several roles together from the next update on: of the joint databases of
+ * a name the clip, frame and cast that cost least, of those that the facts of each for its roles let. Gives what it costs: they play
+ * where that is at most `most`; who is not cast goes on. Infinite where nothing may play, NaN where there is no such set, a
+ * character is none or there twice, or a fact is refused. Of databases with the features of the controller. */
+CDB_API double cdbm_meet_ones(cdbm_crowd *crowd, const char *name, const size_t *who, size_t n, double most)
+{
+    const cdbm_player *player = &crowd->player;
+    size_t databases[CDBM_MOST_DATABASES], n_databases, n_features = player->controller.n_features, i, k;
+    double thresholds[CDBM_MOST_DATABASES];
+    int set = cdbm_set_number(player, name);
+    cdbm_asked tables[CDBM_MOST_TABLES];
+    cdbm_room room = crowd->room;
+    cdbm_together together;
+    cdbm_joint_hit hit;
+    cdbm_actor *actors = (cdbm_actor *)cdbm_part(&room, n < CDBM_MOST_MEETING ? n * sizeof *actors : CDBM_MOST_MEETING * sizeof *actors);
+    n_databases = set < 0 ? 0 : cdbm_databases_of(player, (size_t)set, databases, thresholds);
+    if (n_databases == 0 || n < 1 || n > CDBM_MOST_MEETING || !actors || player->frames[databases[0]].n_features != n_features) return NAN;
+    memset(&together, 0, sizeof together), memset(tables, 0, sizeof tables);
+    for (i = 0; i < n; i++) {
+        double *query = (double *)cdbm_part(&room, n_features * sizeof *query);
+        for (k = 0; k < i && who[k] != who[i]; k++) {}
+        if (who[i] >= crowd->n || k < i || !query) return NAN;
+        cdbm_take_part(player, crowd->states + who[i] * cdbm_state_width(player), query, &actors[i]);
+    }
+    for (i = 0; i < n_databases; i++) {
+        int64_t table = player->table_of[databases[i]];
+        if (table >= 0 && !tables[table].facts && !cdbm_ask_of_all(crowd, (size_t)table, (size_t)set, who, n, &tables[table], &room)) return NAN;
+    }
+    together.set = (size_t)set, together.actors = actors, together.n_actors = n, together.tables = tables;
+    together.unknown = crowd->inputs[who[0]].unknown, together.fault = &crowd->fault;
+    if (cdbm_choose_together(player, &together, &hit, room) != 1) return NAN;
+    for (k = 0; hit.range >= 0 && hit.cost <= most && k < hit.n_roles; k++) {
+        size_t one = who[hit.cast[k]];
+        crowd->one_offs[one] = hit.one_offs[k], crowd->inputs[one].one_off = &crowd->one_offs[one];
+    }
+    return hit.cost;
 }
 
 /* Let a character go on from a state, as its CDBM_STATE_NUMBERS were once, here or elsewhere. 0 where it is none of such a character. */

@@ -256,41 +256,39 @@ CDBM_WIDE static void cdbm_search_joint_wide(const cdbm_joint *joint, cdbm_meeti
 }
 #endif
 
-/* Lower the best totals of a meeting to those of its casts; 0 where memory is missing. On a tie the lowest frame wins, then the first
+/* How many bytes of room a search takes for so many actors and casts. */
+static inline size_t cdbm_joint_room(const cdbm_joint *joint, size_t n_actors, size_t n_casts)
+{
+    size_t n_plays = n_actors * joint->n_roles, n_both = joint->n_pairs * n_actors * n_actors, n = joint->n_boxes * sizeof(double);
+    return cdbm_rounded(n_plays * n) + cdbm_rounded(n_casts * n) + cdbm_rounded(n) + cdbm_rounded(n_both * CDBM_JOINT_TILE * sizeof(double))
+        + cdbm_rounded(n_plays * CDBM_FRAMES * sizeof(double)) + 2 * cdbm_rounded(n_plays) + cdbm_rounded(n_both)
+        + cdbm_rounded(joint->n_boxes * sizeof(size_t));
+}
+
+/* Lower the best totals of a meeting to those of its casts; 0 with too little room. On a tie the lowest frame wins, then the first
  * cast; casts before these, whose bests are there already, win over them. */
-static inline int cdbm_search_joint(const cdbm_joint *joint, cdbm_meeting *asked)
+static inline int cdbm_search_joint(const cdbm_joint *joint, cdbm_meeting *asked, cdbm_room room)
 {
     size_t n_plays = asked->n_actors * joint->n_roles, n_both = joint->n_pairs * asked->n_actors * asked->n_actors;
     cdbm_joint_memory memory;
-    int is_taken;
-    memory.own = (double *)CDB_MALLOC(n_plays * joint->n_boxes * sizeof(double) + 1);
-    memory.bounds = (double *)CDB_MALLOC(asked->n_casts * joint->n_boxes * sizeof(double) + 1);
-    memory.least = (double *)CDB_MALLOC(joint->n_boxes * sizeof(double) + 1);
-    memory.near = (double *)CDB_MALLOC(n_both * CDBM_JOINT_TILE * sizeof(double) + 1);
-    memory.costs = (double *)CDB_MALLOC(n_plays * CDBM_FRAMES * sizeof(double) + 1);
-    memory.plays = (unsigned char *)CDB_MALLOC(n_plays + 1);
-    memory.is_near = (unsigned char *)CDB_MALLOC(n_both + 1);
-    memory.is_known = (unsigned char *)CDB_MALLOC(n_plays + 1);
-    memory.heap = (size_t *)CDB_MALLOC(joint->n_boxes * sizeof(size_t) + 1);
-    is_taken = memory.own && memory.bounds && memory.least && memory.near && memory.costs && memory.plays && memory.is_near
-        && memory.is_known && memory.heap;
-    if (is_taken) {
+    memory.own = (double *)cdbm_part(&room, n_plays * joint->n_boxes * sizeof(double));
+    memory.bounds = (double *)cdbm_part(&room, asked->n_casts * joint->n_boxes * sizeof(double));
+    memory.least = (double *)cdbm_part(&room, joint->n_boxes * sizeof(double));
+    memory.near = (double *)cdbm_part(&room, n_both * CDBM_JOINT_TILE * sizeof(double));
+    memory.costs = (double *)cdbm_part(&room, n_plays * CDBM_FRAMES * sizeof(double));
+    memory.plays = (unsigned char *)cdbm_part(&room, n_plays), memory.is_known = (unsigned char *)cdbm_part(&room, n_plays);
+    memory.is_near = (unsigned char *)cdbm_part(&room, n_both);
+    memory.heap = (size_t *)cdbm_part(&room, joint->n_boxes * sizeof(size_t));
+    if (!memory.own || !memory.bounds || !memory.least || !memory.near || !memory.costs || !memory.plays || !memory.is_near
+        || !memory.is_known || !memory.heap) return 0;
 #ifdef CDBM_WIDE
-        if (cdbm_best_lanes().bounds == cdbm_bounds_wide) cdbm_search_joint_wide(joint, asked, &memory);
-        else
-#endif
-        cdbm_search_joint_now(joint, asked, &memory);
+    if (cdbm_best_lanes().bounds == cdbm_bounds_wide) {
+        cdbm_search_joint_wide(joint, asked, &memory);
+        return 1;
     }
-    CDB_FREE(memory.own);
-    CDB_FREE(memory.bounds);
-    CDB_FREE(memory.least);
-    CDB_FREE(memory.near);
-    CDB_FREE(memory.costs);
-    CDB_FREE(memory.plays);
-    CDB_FREE(memory.is_near);
-    CDB_FREE(memory.is_known);
-    CDB_FREE(memory.heap);
-    return is_taken;
+#endif
+    cdbm_search_joint_now(joint, asked, &memory);
+    return 1;
 }
 
 /* Whether each number of rows of numbers is at least 0 and below `end`. */
@@ -302,8 +300,8 @@ static int cdbm_are_below(const int64_t *numbers, size_t n, size_t end)
     return 1;
 }
 
-/* Whether all that a joint search reads by numbers is there. */
-static inline int cdbm_is_joint_whole(const cdbm_joint *joint, const cdbm_meeting *asked)
+/* Whether all that a joint search reads by numbers is there, but for its casts, which are numbers of actors. */
+static inline int cdbm_is_joint_whole(const cdbm_joint *joint)
 {
     size_t i;
     for (i = 0; i <= joint->n_channels; i++) {
@@ -313,6 +311,5 @@ static inline int cdbm_is_joint_whole(const cdbm_joint *joint, const cdbm_meetin
     return cdbm_are_below(joint->rank, joint->n_features, joint->n_features)
         && cdbm_are_below(joint->boxes, joint->n_boxes * joint->n_roles, joint->n_own)
         && cdbm_are_below(joint->ranges, joint->n_boxes, joint->n_ranges)
-        && cdbm_are_below(joint->pairs, 2 * joint->n_pairs, joint->n_roles)
-        && cdbm_are_below(asked->casts, asked->n_casts * joint->n_roles, asked->n_actors);
+        && cdbm_are_below(joint->pairs, 2 * joint->n_pairs, joint->n_roles);
 }

@@ -8,4 +8,6 @@
 #include "controller.h"
 #include "follow.h"
 #include "walk.h"
+#include "tags.h"
 #include "nodes.h"
+#include "meeting.h"

@@ -2,6 +2,8 @@
  *
  *   cdbm_warp       the path of an animation, warped so that it ends at a target
  *   cdbm_aim        what the way to a target adds to the cost of each frame: a match node's search is the database's own, with that
+ *   cdbm_write_ends where each frame's animation brings the body by itself
+ *   cdbm_shortest_part   the shortest part of an animation that leads from one pose to another
  *   cdbm_open_gate  whether something that costs so much may be entered
  *
  * A target, and every place here, is seen by the body as it stands when the animation is entered: metres to its left and ahead, radians
@@ -192,23 +194,148 @@ static inline double cdbm_duration_s(const cdbm_clips *clips, const cdbm_one_off
     return (one->last - one->frame) / (clips->rate * one->rate);
 }
 
-/* Begin one at a frame of a database; `warps` are the two spans of its range in which it may be warped, [2, 2] in seconds since its start,
- * NaN: as long as it is. */
+/* The windows of position and rotation that are left to a frame of a range which plays on up to another one, in seconds since the frame;
+ * one that ends before it begins has no time left. `warps` are the two spans of the range in which it may be warped, [2, 2] in seconds since
+ * its start, NaN: as long as it is. */
+static inline void cdbm_write_windows(const cdbm_clips *clips, size_t range, int64_t frame, int64_t last, const double *warps, cdbm_window *windows)
+{
+    double own_s = (double)(frame - clips->starts[range]) / clips->rate, last_s = (double)(last - frame) / clips->rate;
+    size_t i;
+    for (i = 0; i < 2; i++) {
+        double from_s = warps[2 * i] - own_s, to_s = warps[2 * i + 1] - own_s;
+        windows[i].from_s = from_s > 0.0 ? from_s : 0.0;
+        windows[i].to_s = to_s < last_s ? to_s : last_s;
+    }
+}
+
+/* Begin one at a frame of a database. */
 static inline void cdbm_begin_one_off(const cdbm_clips *clips, size_t range, int64_t frame, const cdb_row_play *play,
     const double *warps, const cdbm_target *target, cdbm_one_off *one)
 {
-    double own_s = (double)(frame - clips->starts[range]) / clips->rate, last_s;
+    int64_t last = cdbm_free_until(clips, frame + 1, clips->stops[range]) - 1;
     size_t i;
-    one->range = (double)range, one->frame = (double)frame, one->time_s = one->since_s = 0.0;
-    one->last = (double)(cdbm_free_until(clips, frame + 1, clips->stops[range]) - 1);
+    one->range = (double)range, one->frame = (double)frame, one->last = (double)last, one->time_s = one->since_s = 0.0;
     one->play = *play, one->rate = play->min_rate == play->min_rate ? cdbo_within(1.0, play->min_rate, play->max_rate) : 1.0;
-    last_s = (one->last - one->frame) / clips->rate;
-    for (i = 0; i < 2; i++) {
-        double from_s = warps[2 * i] - own_s, to_s = warps[2 * i + 1] - own_s;
-        one->windows[i].from_s = (from_s > 0.0 ? from_s : 0.0) / one->rate;
-        one->windows[i].to_s = (to_s < last_s ? to_s : last_s) / one->rate;
-    }
+    cdbm_write_windows(clips, range, frame, last, warps, one->windows);
+    for (i = 0; i < 2; i++) one->windows[i].from_s /= one->rate, one->windows[i].to_s /= one->rate;
     one->target = *target;
+}
+
+/* Forbid the frames of ranges but that at which their row says that they are entered. */
+static inline void cdbm_forbid_others(const cdbm_clips *clips, const cdb_row_play *plays, const int64_t *play_of, double *biases)
+{
+    size_t r;
+    int64_t i, entry;
+    for (r = 0; plays && r < clips->n_ranges; r++) {
+        double start_s = play_of[r] < 0 ? NAN : plays[play_of[r]].start_s;
+        if (!(start_s == start_s) || clips->starts[r] == clips->stops[r]) continue;
+        entry = cdbm_frame_at(clips, r, start_s);
+        for (i = clips->starts[r]; i < clips->stops[r]; i++)
+            if (i != entry) biases[i] = (double)INFINITY;
+    }
+}
+
+/* ---- where animations end */
+
+/* A path at a fractional row, at most at its last one: x and z, and the heading, of which `headings` has those that go on without jumps. */
+static inline void cdbm_row_of_path(const float *root, const double *headings, double row, size_t last, double *to)
+{
+    size_t low = row < (double)last ? (size_t)row : last, high = low < last ? low + 1 : last, k;
+    double share = cdbo_within(row - (double)low, 0.0, 1.0);
+    for (k = 0; k < 2; k++) to[k] = (double)root[3 * low + k] * (1.0 - share) + (double)root[3 * high + k] * share;
+    to[2] = headings[low] * (1.0 - share) + headings[high] * share;
+}
+
+/* Write where each frame's animation brings the body by itself, seen from the frame: [N, 3]. The place is that at the end of what is
+ * left of the positional warp range, [R, 2, 2], the turn that at the end of the rotational one; where there is no time left, that at the end
+ * of the animation. `headings` has room for the longest range. */
+static inline void cdbm_write_ends(const cdbm_clips *clips, const double *warps, double *headings, double *ends)
+{
+    size_t r, n, i;
+    memset(ends, 0, 3 * clips->frames->n_frames * sizeof *ends);
+    for (r = 0; r < clips->n_ranges; r++) {
+        int64_t start = clips->starts[r], until = start, f;
+        const float *root = clips->root + 3 * start;
+        n = (size_t)(clips->stops[r] - start);
+        for (i = 0; i < n; i++) headings[i] = (double)root[3 * i + 2];
+        cdbo_unwrap(headings, 1, n);
+        for (f = start; f < clips->stops[r]; f++) {
+            double there[2][3], row = (double)(f - start), *end = ends + 3 * f;
+            const float *here = root + 3 * (f - start);
+            cdbm_window windows[2];
+            if (until <= f) until = cdbm_free_until(clips, f + 1, clips->stops[r]);
+            cdbm_write_windows(clips, r, f, until - 1, warps + 4 * r, windows);
+            for (i = 0; i < 2; i++) {
+                double arrival_s = cdbm_is_open(&windows[i]) ? windows[i].to_s : (double)(until - 1 - f) / clips->rate;
+                cdbm_row_of_path(root, headings, row + arrival_s * clips->rate, (size_t)(until - 1 - start), there[i]);
+            }
+            cdbm_seen(there[0][0] - (double)here[0], there[0][1] - (double)here[1], headings[f - start], end);
+            end[2] = there[1][2] - headings[f - start];
+        }
+    }
+}
+
+/* ---- stitches */
+
+typedef struct cdbm_stretch { int64_t first, last; double cost; } cdbm_stretch; /* first -1: there is none */
+
+/* How many bytes of room the search for a part takes. */
+static inline size_t cdbm_part_room(const cdbm_frames *frames)
+{
+    return 2 * cdbm_rounded(frames->n_features * sizeof(double)) + cdbm_rounded(frames->n_frames * sizeof(double));
+}
+
+/* Find the shortest part whose first frame, with its biases, and last frame cost at most so much together: the first for the query of what
+ * is asked, the last for another one. It is a frame long at least; of parts that are equally short the one that costs least, on a tie
+ * the earliest. 1; 0 with too little room; -1 for a query that cannot be compared. */
+static inline int cdbm_shortest_part(const cdbm_clips *clips, const cdbm_question *asked, const double *after, double most_cost,
+    cdbm_stretch *to, cdbm_room room)
+{
+    const cdbm_frames *frames = clips->frames;
+    double *query = (double *)cdbm_part(&room, frames->n_features * sizeof(double));
+    double *next = (double *)cdbm_part(&room, frames->n_features * sizeof(double));
+    double *ends = (double *)cdbm_part(&room, frames->n_frames * sizeof(double));
+    int64_t shortest = INT64_MAX, until = 0, n;
+    size_t box, lane;
+    to->first = to->last = -1, to->cost = (double)INFINITY;
+    if (!query || !next || !ends) return 0;
+    if (!cdbm_normalise_exactly(frames, asked->queries, query) || !cdbm_normalise_exactly(frames, after, next)) return -1;
+    for (box = 0; box < frames->n_boxes; box++)
+        for (lane = 0; lane < (size_t)frames->box_sizes[box]; lane++)
+            ends[frames->box_starts[box] + (int64_t)lane] = cdbm_cost(frames, box, lane, next);
+    for (box = 0; box < frames->n_boxes; box++) {
+        size_t range = (size_t)frames->box_ranges[box];
+        if (!asked->ranges[range]) continue;
+        for (lane = 0; lane < (size_t)frames->box_sizes[box]; lane++) {
+            int64_t frame = frames->box_starts[box] + (int64_t)lane;
+            size_t kind = frames->kinds ? (size_t)frames->kinds[frame] : 0;
+            double bias = asked->range_biases[range] + asked->kind_biases[kind], first;
+            if (asked->frame_biases) bias += asked->frame_biases[frame];
+            if (!asked->allowed[kind] || (asked->flags && !asked->flags[frame]) || bias == (double)INFINITY) continue;
+            if (until <= frame || until > clips->stops[range]) until = cdbm_free_until(clips, frame + 1, clips->stops[range]);
+            first = cdbm_cost(frames, box, lane, query) + bias;
+            for (n = 1; n <= shortest && frame + n < until; n++) {
+                double cost = first + ends[frame + n];
+                if (!(cost <= most_cost)) continue;
+                if (n < shortest || cost < to->cost) shortest = n, to->first = frame, to->last = frame + n, to->cost = cost;
+                break;
+            }
+        }
+    }
+    return 1;
+}
+
+/* Begin one that plays a part as it is. */
+static inline void cdbm_begin_part(const cdbm_clips *clips, size_t range, const cdbm_stretch *part, const cdb_row_play *play, cdbm_one_off *one)
+{
+    const float *here = clips->root + 3 * part->first, *there = clips->root + 3 * part->last;
+    double no_warps[4] = {NAN, NAN, NAN, NAN}, way[2];
+    cdbm_target target;
+    cdbm_seen((double)there[0] - (double)here[0], (double)there[1] - (double)here[1], (double)here[2], way);
+    target.left = way[0], target.ahead = way[1], target.turn = cdbo_remainder((double)there[2] - (double)here[2]);
+    cdbm_begin_one_off(clips, range, part->first, play, no_warps, &target, one);
+    memset(one->windows, 0, sizeof one->windows);
+    one->last = (double)part->last, one->cost = part->cost;
 }
 
 /* How many bytes of room a path of so many frames takes. */

@@ -9,6 +9,8 @@ static PyObject *cdbp_search_joint(PyObject *self, PyObject *const *arguments, P
     cdbm_meeting asked;
     size_t shape[4], n_slots;
     PyThreadState *state;
+    cdbm_room room;
+    void *memory;
     int is_done;
     (void)self;
     arrays.n = 0;
@@ -67,10 +69,13 @@ static PyObject *cdbp_search_joint(PyObject *self, PyObject *const *arguments, P
     if (!(asked.casts_of = (int64_t *)cdbp_items(&arrays, arguments[21], 'i', 8, 1, 1, shape + 1))) goto failed;
     asked.is_each = n_slots != 1;
     if (shape[0] != n_slots || shape[1] != n_slots || (asked.is_each && n_slots != asked.n_casts * joint.n_ranges)) goto wrong;
-    if (!cdbm_is_joint_whole(&joint, &asked)) goto wrong;
+    if (!cdbm_is_joint_whole(&joint) || !cdbm_are_below(asked.casts, asked.n_casts * joint.n_roles, asked.n_actors)) goto wrong;
+    room.left = cdbm_joint_room(&joint, asked.n_actors, asked.n_casts);
+    is_done = (memory = room.at = (char *)PyMem_Malloc(room.left + 1)) != NULL;
     state = PyEval_SaveThread();
-    is_done = cdbm_search_joint(&joint, &asked);
+    is_done = is_done && cdbm_search_joint(&joint, &asked, room);
     PyEval_RestoreThread(state);
+    PyMem_Free(memory);
     cdbp_release(&arrays);
     return is_done ? cdbp_new_ref(Py_None) : PyErr_NoMemory();
 wrong:

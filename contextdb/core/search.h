@@ -270,16 +270,23 @@ static double cdbm_least_range(const cdbm_frames *frames, const uint8_t *ranges,
     return least;
 }
 
-/* Normalise a query: in float64, and at the places of the layout in float32 and in levels. Gives its weighted square, or -1 when a number
- * is NaN or too large to be compared. */
+/* Normalise a query in float64; 0 when a number is NaN or too large to be compared. */
+static int cdbm_normalise_exactly(const cdbm_frames *frames, const double *raw, double *query)
+{
+    size_t f;
+    for (f = 0; f < frames->n_features; f++) {
+        query[f] = (raw[f] - frames->offset[f]) / frames->scale[f];
+        if (!(cdbm_size_of(query[f]) <= CDBM_GREATEST && cdbm_size_of(raw[f]) <= CDBM_GREATEST)) return 0;
+    }
+    return 1;
+}
+
+/* The same, and at the places of the layout in float32 and in levels. Gives its weighted square, or -1. */
 static double cdbm_normalise(const cdbm_frames *frames, const double *raw, double *query, float *narrow, int16_t *levels)
 {
     double size = 0.0;
     size_t f;
-    for (f = 0; f < frames->n_features; f++) {
-        query[f] = (raw[f] - frames->offset[f]) / frames->scale[f];
-        if (!(cdbm_size_of(query[f]) <= CDBM_GREATEST && cdbm_size_of(raw[f]) <= CDBM_GREATEST)) return -1.0;
-    }
+    if (!cdbm_normalise_exactly(frames, raw, query)) return -1.0;
     if (frames->n_pairs) levels[2 * frames->n_pairs - 1] = 0;
     for (f = 0; f < frames->n_features; f++) {
         double number = query[frames->order[f]];

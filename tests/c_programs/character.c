@@ -79,23 +79,140 @@ static void follow(const cdbm_player *player, size_t n, double dt_s, const memor
     free(packets);
 }
 
-/* Enter one-offs: of each who enters, in which database, the target and the two weights. Copies are given what their owners have. */
+/* What a match may be given beside its target, of 11 numbers: how each of three tags counts (0: not), and what it costs; a range whose asset
+ * costs more, and how much; whether a third of the frames is left out; the frame that a stitch leads to, and what it may cost. */
+typedef struct options {
+    cdbm_tags tags;
+    const char *lists[3][3];
+    cdbm_named_cost costs[2][3], penalty;
+    uint8_t *frames;
+    double *after;
+} options;
+
+static const cdbm_tags *give_tags(const double *numbers, options *own)
+{
+    size_t counts[6] = {0, 0, 0, 0, 0, 0}, i;
+    memset(own, 0, sizeof *own);
+    for (i = 0; i < 3; i++) {
+        size_t way = (size_t)numbers[i], *n = &counts[way];
+        if (way >= 1 && way <= 3) own->lists[way - 1][(*n)++] = events[i];
+        if (way < 4) continue;
+        own->costs[way - 4][*n].name = events[i], own->costs[way - 4][(*n)++].cost = numbers[3 + i];
+    }
+    own->tags.include = own->lists[0], own->tags.n_include = counts[1], own->tags.every = own->lists[1], own->tags.n_every = counts[2];
+    own->tags.exclude = own->lists[2], own->tags.n_exclude = counts[3], own->tags.prefer = own->costs[0], own->tags.n_prefer = counts[4];
+    own->tags.avoid = own->costs[1], own->tags.n_avoid = counts[5];
+    return counts[1] + counts[2] + counts[3] + counts[4] + counts[5] > 0 ? &own->tags : NULL;
+}
+
+static void give_options(const cdbm_player *player, const double *numbers, cdbm_match *match, options *own)
+{
+    const cdbm_frames *frames = &player->frames[match->database];
+    size_t i;
+    match->tags = give_tags(numbers, own);
+    own->penalty.cost = numbers[7];
+    own->penalty.name = numbers[6] < 0.0 ? NULL : cdbm_text(&player->bundle, CDBM_P_ASSETS, (size_t)player->database_of[match->database], (size_t)numbers[6]);
+    if (own->penalty.name) match->penalties = &own->penalty, match->n_penalties = 1;
+    own->frames = (uint8_t *)malloc(frames->n_frames + 1), own->after = (double *)malloc((frames->n_features + 1) * sizeof(double));
+    if (!own->frames || !own->after) exit(1);
+    for (i = 0; i < frames->n_frames; i++) own->frames[i] = i % 3 != 0;
+    if (numbers[8] != 0.0) match->frames = own->frames;
+    if (numbers[9] >= 0.0) cdbm_features(frames, (int64_t)numbers[9], own->after);
+}
+
+/* Enter one-offs: of each who enters, in which database, the target, the two weights and options. Copies are given what their owners have. */
 static void enter(const cdbm_player *player, int64_t n_entries, const memory *own, const memory *copies, size_t n)
 {
     for (; n_entries > 0; n_entries--) {
-        const double *numbers = (const double *)take(8, 7);
+        const double *numbers = (const double *)take(8, 18), *state;
         size_t who = (size_t)numbers[0];
-        cdbm_match match = {0, {0.0, 0.0, 0.0}, 0.0, 0.0, NULL};
+        cdbm_input *input = &own->inputs[who];
+        cdbm_match match;
+        options given;
+        int is_done;
+        memset(&match, 0, sizeof match);
         match.database = (size_t)numbers[1], match.position_weight = numbers[5], match.rotation_weight = numbers[6];
         memcpy(&match.target, numbers + 2, sizeof match.target);
-        if (cdbm_enter(player, own->states + who * cdbm_state_width(player), &own->inputs[who], &match, &own->one_offs[who], own->room) != 1) exit(10);
+        give_options(player, numbers + 7, &match, &given);
+        state = own->states + who * cdbm_state_width(player);
+        is_done = numbers[16] < 0.0 ? cdbm_enter(player, state, input, &match, &own->one_offs[who], own->room)
+            : cdbm_stitch(player, state, input, &match, given.after, numbers[17], &own->one_offs[who], own->room);
+        if (is_done != 1) exit(10);
         own->are_playing[who] = own->one_offs[who].range >= 0.0;
+        free(given.frames);
+        free(given.after);
     }
     memcpy(copies->one_offs, own->one_offs, n * sizeof *own->one_offs);
 }
 
-/* An update: seconds, the ground (0 flat, 1 a slope, 2 stairs), how many enter a one-off, and for each its goal, the number of its gait,
- * a fact of the one table, the number of an event, -1 for none, and in how many seconds that is to happen. */
+/* Let characters choose a clip together: whether they play it, the set, who takes part, what the table is asked (0: nothing, 1: facts, 2: facts with
+ * offers for its roles, 3: its rows), how readily roles give way, casts, whether in a match range alone, and tags. Writes what they choose. */
+static void meet(const cdbm_player *player, const memory *own, FILE *out)
+{
+    static const char *const names[] = {"rain", "Host.mood", "Guest.side", "Judge.awake"}, *const roles[] = {"Host", "Guest", "Judge"};
+    const double *at_number = (const double *)take(8, (size_t)*(const int64_t *)take(8, 1));
+    const cdb_any *any = player->opened[player->n_tables - 1];
+    cdbm_actor actors[4];
+    cdbm_asked tables[CDBM_MOST_TABLES], *asked = &tables[player->n_tables - 1];
+    cdb_actor offers[12];
+    cdb_fact facts[13][4];
+    cdbm_together together;
+    cdbm_joint_hit hit;
+    cdbm_room room;
+    options given;
+    double *queries = (double *)malloc(4 * sizeof(double) * player->controller.n_features), gives[2], told[6];
+    int64_t casts[24];
+    uint64_t rows;
+    size_t who[4], i, k, way;
+    int is_played = *at_number++ != 0.0;
+    memset(&together, 0, sizeof together), memset(tables, 0, sizeof tables);
+    together.set = (size_t)*at_number++, together.n_actors = (size_t)*at_number++, together.actors = actors, together.tables = tables;
+    for (i = 0; i < together.n_actors; i++) {
+        who[i] = (size_t)*at_number++;
+        cdbm_take_part(player, own->states + who[i] * cdbm_state_width(player), queries + i * player->controller.n_features, &actors[i]);
+    }
+    way = (size_t)*at_number++;
+    for (i = 0; i < 13; i++)
+        for (k = 0; k < 4; k++) facts[i][k] = cdbi_missing(&any->schema.conditions[k]);
+    if (way == 1 || way == 2) {
+        facts[0][cdb_condition_number(&any->schema, names[0])].whole = (int64_t)*at_number++;
+        asked->facts = facts[0];
+    }
+    if (way == 1) {
+        for (k = 1; k < 4; k++) {
+            cdb_fact *fact = &facts[0][cdb_condition_number(&any->schema, names[k])];
+            if (k == 2) fact->number = *at_number++;
+            else fact->whole = (int64_t)*at_number++;
+        }
+    } else if (way == 2) {
+        asked->n_offers = (size_t)*at_number++, asked->offers = offers;
+        for (i = 0; i < asked->n_offers; i++) {
+            size_t role = (size_t)*at_number++;
+            cdb_fact *fact = &facts[i + 1][cdb_condition_number(&any->schema, names[role + 1])];
+            offers[i].role = cdb_role_number(&any->table, roles[role]), offers[i].id = (int64_t)*at_number++, offers[i].cost = cdb_missing_number();
+            offers[i].facts = facts[i + 1];
+            if (role == 1) fact->number = *at_number++;
+            else fact->whole = (int64_t)*at_number++;
+        }
+    } else if (way == 3) rows = (uint64_t)*at_number++, asked->rows = &rows;
+    if (*at_number++ != 0.0) together.gives = gives;
+    gives[0] = *at_number++, gives[1] = *at_number++;
+    if (*at_number++ != 0.0) together.casts = casts;
+    together.n_casts = (size_t)*at_number++;
+    for (i = 0; i < 2 * together.n_casts; i++) casts[i] = (int64_t)*at_number++;
+    together.in_match_range = *at_number++ != 0.0, together.tags = give_tags(at_number, &given);
+    room.left = cdbm_together_room(player, together.set, together.n_actors, asked->n_offers), room.at = (char *)malloc(room.left);
+    if (!room.at || !queries || cdbm_choose_together(player, &together, &hit, room) != 1) exit(11);
+    told[0] = (double)hit.range, told[1] = (double)hit.frame, told[2] = way == 3 ? -1.0 : (double)hit.row, told[3] = hit.cost;
+    for (k = 0; k < 2; k++) told[4 + k] = hit.range < 0 ? -1.0 : (double)hit.cast[k];
+    write_all(out, told, sizeof(double), 6);
+    for (k = 0; is_played && hit.range >= 0 && k < hit.n_roles; k++) own->one_offs[who[hit.cast[k]]] = hit.one_offs[k], own->are_playing[who[hit.cast[k]]] = 1;
+    free(queries);
+    free(room.at);
+}
+
+/* An update: seconds, the ground (0 flat, 1 a slope, 2 stairs), how many enter a one-off, how often some meet, and for each its goal, the
+ * number of its gait, a fact of the one table, the number of an event, -1 for none, and in how many seconds that is to happen. */
 static void update(const cdbm_player *player, size_t n, const memory *own, const memory *copies, FILE *out)
 {
     double *states = own->states;
@@ -103,15 +220,15 @@ static void update(const cdbm_player *player, size_t n, const memory *own, const
     cdbm_input *inputs = own->inputs;
     cdbm_room room = own->room;
     double dt_s = *(const double *)take(8, 1);
-    int64_t numbers[2], n_entries;
+    int64_t numbers[2], n_entries, n_meetings;
     const cdb_schema *schema = player->n_tables > 0 ? &player->opened[0]->schema : NULL;
     int gait = schema ? cdb_condition_number(schema, "gait") : -1;
-    const cdb_fact **lists = (const cdb_fact **)calloc(n, sizeof *lists);
+    const cdb_fact **lists = (const cdb_fact **)calloc(n * (player->n_tables + 1), sizeof *lists);
     cdb_fact *facts = (cdb_fact *)calloc(n * 8, sizeof *facts);
     size_t i, k, width = cdbm_state_width(player), n_joints = player->poses.rig.n_joints;
     if (!lists || !facts || (schema && schema->n_conditions > 8)) exit(1);
     memcpy(numbers, take(8, 2), sizeof numbers);
-    n_entries = numbers[1];
+    n_entries = numbers[1], n_meetings = *(const int64_t *)take(8, 1);
     for (i = 0; i < n; i++) {
         memset(&inputs[i], 0, sizeof inputs[i]);
         memcpy(&inputs[i].goal, take(8, 3), sizeof inputs[i].goal);
@@ -122,9 +239,10 @@ static void update(const cdbm_player *player, size_t n, const memory *own, const
         memcpy(&numbers[1], take(8, 1), 8);
         memcpy(&inputs[i].event_s, take(8, 1), 8);
         if (numbers[1] >= 0) inputs[i].event = events[numbers[1]];
-        lists[i] = facts + 8 * i;
-        inputs[i].facts = lists + i;
+        lists[i * player->n_tables] = facts + 8 * i;
+        inputs[i].facts = lists + i * player->n_tables;
     }
+    for (; n_meetings > 0; n_meetings--) meet(player, own, out);
     enter(player, n_entries, own, copies, n);
     for (i = 0; i < n; i++)
         if (own->are_playing[i]) inputs[i].one_off = &own->one_offs[i];
@@ -150,12 +268,53 @@ static uint64_t drawn(uint64_t *seed)
     return z ^ (z >> 31);
 }
 
+/* A character meets itself, and plays a part of what it finds. */
+static int try_meeting(const cdbm_player *player, const double *state, int tick, cdbm_one_off *to)
+{
+    static const double ways[3][6] = {{0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, {3.0, 0.0, 0.0, 0.0, 0.0, 0.0}, {4.0, 5.0, 0.0, 1.0, 2.0, 0.0}};
+    cdbm_asked tables[CDBM_MOST_TABLES], *asked = player->n_tables > 0 ? &tables[player->n_tables - 1] : NULL;
+    const cdb_any *any = asked ? player->opened[player->n_tables - 1] : NULL;
+    cdb_fact *facts = (cdb_fact *)calloc(CDB_MOST_FACTS, sizeof *facts);
+    cdb_actor offers[4];
+    cdbm_actor actors[2];
+    cdbm_together together;
+    cdbm_joint_hit hit;
+    cdbm_room room;
+    options given;
+    size_t i;
+    int is_done = 0;
+    double *queries[2];
+    memset(&together, 0, sizeof together), memset(tables, 0, sizeof tables);
+    for (i = 0; any && i < any->schema.n_conditions; i++) facts[i] = cdbi_missing(&any->schema.conditions[i]);
+    for (i = 0; i < 4; i++) {
+        offers[i].id = (int64_t)(i % 2), offers[i].cost = 1.0, offers[i].facts = facts;
+        offers[i].role = any ? cdb_role_number(&any->table, i < 2 ? "Host" : "Guest") : -1;
+    }
+    for (i = 0; i < 2; i++) queries[i] = (double *)calloc(player->controller.n_features + 64, sizeof(double)), cdbm_take_part(player, state, queries[i], &actors[i]);
+    actors[1].place[1] += 1.0;
+    together.actors = actors, together.n_actors = 2, together.set = (size_t)tick % 2, together.unknown = CDB_UNKNOWN_ANY, together.tags = give_tags(ways[tick % 3], &given);
+    if (asked && tick % 4 > 0) together.tables = tables, asked->facts = facts;
+    if (asked && tick % 4 > 1) asked->offers = offers, asked->n_offers = 4;
+    room.left = cdbm_together_room(player, together.set, 2, 4), room.at = (char *)malloc(room.left);
+    for (i = 0; i < CDBM_MOST_DATABASES; i++)
+        if (player->joints[i].joint.n_features > player->controller.n_features + 64) exit(1);
+    if (facts && room.at && cdbm_choose_together(player, &together, &hit, room) == 1 && hit.range >= 0) *to = hit.one_offs[tick % 2], is_done = 1;
+    for (i = 0; i < 2; i++) free(queries[i]);
+    free(room.at);
+    free(facts);
+    return is_done;
+}
+
 static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, cdbm_room room, uint64_t *seed)
 {
     cdbm_input input;
     uint8_t packet[CDBM_MOST_PACKET];
-    cdbm_match match = {0, {0.5, 2.0, 0.3}, 1.0, 1.0, NULL};
+    static const double ways[5][11] = {{0}, {3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, -1.0, 0.0}, {4.0, 5.0, 0.0, 1.0, 2.0, 0.0, -1.0, 0.0, 1.0, 0.0, 3.0},
+        {1.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0, 0.5, 0.0, -1.0, 0.0}, {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 9.0}};
+    cdbm_match match = {0, {0.5, 2.0, 0.3}, 1.0, 1.0, NULL, NULL, NULL, 0, NULL}, tried;
+    options given;
     cdbm_one_off one_off;
+    const double *way;
     float *matrices = (float *)malloc(16 * sizeof(float) * player->poses.rig.n_joints + 1);
     int tick;
     memset(&input, 0, sizeof input);
@@ -166,8 +325,14 @@ static void try_out(const cdbm_player *player, double *state, cdbm_pose *pose, c
         if (tick > 10) input.ground = slope;
         if (tick == 15 || tick == 25) {
             match.target.ahead = tick, match.database = drawn(seed) % player->controller.n_databases;
-            input.one_off = cdbm_enter(player, state, &input, &match, &one_off, room) == 1 && one_off.range >= 0.0 ? &one_off : NULL;
+            tried = match, way = ways[drawn(seed) % 5];
+            give_options(player, way, &tried, &given);
+            input.one_off = (way[9] < 0.0 ? cdbm_enter(player, state, &input, &tried, &one_off, room)
+                : cdbm_stitch(player, state, &input, &tried, given.after, way[10], &one_off, room)) == 1 && one_off.range >= 0.0 ? &one_off : NULL;
+            free(given.frames);
+            free(given.after);
         }
+        if ((tick == 5 || tick == 20 || tick == 35) && try_meeting(player, state, (int)(drawn(seed) % 12), &one_off)) input.one_off = &one_off;
         if (input.one_off && cdbm_is_over(player, input.one_off)) input.one_off = NULL;
         input.n_packet = cdbm_pack(player, state, packet), input.packet = packet;
         if (input.n_packet > 0 && tick % 2) packet[drawn(seed) % input.n_packet] = (uint8_t)drawn(seed);

@@ -11,12 +11,19 @@ int main(int n_words, char **words)
     void *bytes = cdb_read_file(words[n_words - 1], &size, NULL);
     cdbm_crowd *crowd = cdbm_open_crowd(bytes, size, NULL, 2, CDB_UNKNOWN_ANY, &why);
     const double *state = crowd ? cdbm_crowd_numbers(crowd, 1, CDBM_STATE_NUMBERS) : NULL;
+    static const char *const unknown[] = {"Unknown"};
+    cdbm_tags tags;
+    cdbm_match match;
+    cdbm_one_off one;
     double x, z, cost;
     if (!crowd) return puts(why), 1;
     cdbm_steer_one(crowd, 1, 0.0, 1.3, NAN);
     for (i = 0; i < 30; i++)
         if (cdbm_update_crowd(crowd, 1.0 / 30.0, NULL)) return 2;
     x = state[0] + 0.3, z = state[1] + 2.0;
+    memset(&tags, 0, sizeof tags), memset(&match, 0, sizeof match);
+    tags.include = unknown, tags.n_include = 1, match.tags = &tags, match.database = (size_t)cdbm_database_number(&crowd->player, "all");
+    if (cdbm_enter(&crowd->player, state, &crowd->inputs[1], &match, &one, crowd->room) != -3) return 8;
     if (cdbm_enter_one(crowd, 1, "no such", x, z, NAN, 1e9) <= 1e9 || cdbm_enter_one(crowd, 2, "all", x, z, NAN, 1e9) <= 1e9) return 3;
     cost = cdbm_enter_one(crowd, 1, "all", x, z, NAN, 0.0); /* dearer than that: it is not played */
     if (!(cost > 0.0) || crowd->inputs[1].one_off) return 4;

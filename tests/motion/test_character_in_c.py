@@ -9,6 +9,7 @@ import random
 import shutil
 import struct
 from functools import cache
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,9 @@ from contextdb.commands.compile_command import c_motion_header
 from contextdb.commands.motion_build_command import file_of
 from contextdb.compiled.c_header import c_header_of
 from contextdb.core import direction_of
+from contextdb.motion.made.game import JOINT_RECIPES, JOINT_ROLES, make_joint_clip
 from contextdb.motion.markup.markup import Markup
+from contextdb.motion.markup.tag_filter import covers
 from contextdb.motion.output.bank import moving_alike
 from contextdb.motion.selection.chooser import N_DECISION
 from contextdb.motion.storage.bundle import Played, bundle_of
@@ -83,6 +86,20 @@ COLUMNS = {
     "root": ["", "", "", "", "animation", "animation"],
 }
 OUTPUTS = ["play_rate", "start_s", "blend_s", "root"]
+ROLES = {"Host": ("mood", ("glad", "cross")), "Guest": ("side", (-1.0, 0.5, 2.0)), "Judge": ("awake", (False, True))}
+MEETING_CONDITIONS = {
+    "rain": {"type": "bool"},
+    "Host.mood": {"type": "enum", "values": ["glad", "cross"]},
+    "Guest.side": {"type": "number", "mirror": "negate"},
+    "Judge.awake": {"type": "bool"},
+}
+MEETING_COLUMNS = {
+    "Asset Name": ["greet_walk", "greet_tired", "greet_walk", "greet_run", "greet_run", "greet_tired"],
+    "rain": ["Any", "No ~0.25", "Any", "Any", "Yes", "Any"],
+    "Host.mood": ["glad", "Any", "cross ~0.5", "glad ~0.25", "Any", "cross"],
+    "Guest.side": ["Any", "<1", "<0", ">0 ~0.125", "Any", "Any"],
+    "Judge.awake": ["Any", "Any", "Any", "Any", "Yes", "Any"],
+}
 
 
 @cache
@@ -92,6 +109,26 @@ def table(is_captured=False):
         if is_captured
         else cdb.Table.from_columns(COLUMNS, CONDITIONS, {"outputs": OUTPUTS})
     ).compile()
+
+
+@cache
+def meeting_table():
+    return cdb.Table.from_columns(MEETING_COLUMNS, MEETING_CONDITIONS).compile()
+
+
+@cache
+def joint_parts(ways):
+    """Two joint databases of the made greetings, with the features of a controller, and their banks."""
+    schema = parts(ways, False)[0]
+    clips = {name: list(make_joint_clip(name).values()) for name in JOINT_RECIPES}
+    takes = {"tired": clips["greet_tired"], "greetings": [clip for each in clips.values() for clip in each]}
+    marks = Markup.parse(
+        "asset,tag,from,to,value\ngreet_walk.*,WarpPosition,1.0,4.5,\ngreet_run.Host,WarpRotation,0.5,4.2,\n"
+        "greet_walk.Host,MatchRange,0,3,\ngreet_run.Guest,Hit.Soft,2,3,\ngreet_run.Host,Excluded,4.3,4.35,\ngreet_walk.*,Hit,1,2,\n"
+    )
+    databases = {name: motion.MotionDatabase.build(own, schema, mirror=True, markup=marks) for name, own in takes.items()}
+    banks = {name: motion.PoseBank.build(own, schema, mirror=True, markup=marks) for name, own in takes.items()}
+    return {name: motion.JointDatabase.of(each, JOINT_ROLES) for name, each in databases.items()}, banks
 
 
 def captured(name):
@@ -164,26 +201,121 @@ def drawn(rng, is_captured):
     return motion.Controller(motion.Selector(entries), settings), schema, banks, output
 
 
+def options_for(rng, database):
+    """What a match node is given beside its target, at random: what Python takes, and what C is given for it."""
+    options, ways, costs, penalty = {}, [0, 0, 0], [rng.choice([0.0, 0.5, 3.0]) for _ in EVENTS], (-1, 0.0)
+    known = [any(covers(tag, each) for each in database.marks.tags) for tag in EVENTS]
+    if rng.random() < 0.5:
+        ways = [rng.choice([0, 0, 1, 2, 3, 4, 5]) if is_known else 0 for is_known in known]
+        of = [[tag for tag, own in zip(EVENTS, ways, strict=True) if own == way] for way in range(6)]
+        soft = [{tag: costs[EVENTS.index(tag)] for tag in each} for each in of[4:]]
+        options["tags"] = motion.TagFilter(*of[1:4], *soft)
+    if rng.random() < 0.3:
+        penalty = rng.randrange(len(database.assets)), rng.choice([0.25, 4.0, math.inf])
+        options["penalties"] = {database.assets[penalty[0]]: penalty[1]}
+    has_frames = not any(ways) and rng.random() < 0.2
+    if has_frames:
+        options["tags"] = np.arange(database.n_frames) % 3 != 0
+    return options, (*ways, *costs, *penalty, has_frames)
+
+
 def entered(rng, one, stick, gait, nodes):
-    """A one-off that a match node gives a character for a target, None where nothing may play, and what C is given for it."""
+    """A one-off that a match node gives a character, None where nothing may play, and what C is given for it."""
     name = rng.choice(list(nodes))
     node, turn = nodes[name], rng.choice([None, rng.uniform(-4.0, 4.0)])
     target = motion.Target(rng.uniform(-2.0, 2.0), rng.uniform(-1.0, 4.0), turn)
     facts = {"gait": gait, "direction": direction_of(*stick, one.body.heading)}
-    play = node.enter(one.features(), target, one.tables.query(facts))
+    options, numbers = options_for(rng, node.database)
+    stitched = (rng.randrange(node.database.n_frames), rng.choice([1.0, 8.0, 60.0])) if rng.random() < 0.4 else (-1, 0.0)
+    valid = one.tables.query(facts)
+    if stitched[0] < 0:
+        play = node.enter(one.features(), target, valid, **options)
+    else:
+        play = node.stitch(one.features(), node.database.raw(stitched[0]), stitched[1], valid, **options)
     weights = node.position_weight, node.rotation_weight
-    given = list(nodes).index(name), target.left_m, target.ahead_m, math.nan if turn is None else turn, *weights
-    return None if play is None else motion.OneOff(one, play, name), given
+    aimed = list(nodes).index(name), target.left_m, target.ahead_m, math.nan if turn is None else turn, *weights
+    return None if play is None else motion.OneOff(one, play, name), (*aimed, *numbers, *stitched)
+
+
+def offers_for(rng, actors):
+    """Who is offered for which role of the table of meetings, with a fact each, at random."""
+    return {
+        role: [{"id": i, fact: rng.choice(values)} for i in actors if rng.random() < 0.8] for role, (fact, values) in ROLES.items()
+    }
+
+
+def number_of(value):
+    return float(MEETING_CONDITIONS["Host.mood"]["values"].index(value) if isinstance(value, str) else value)
+
+
+def meeting(rng, members, searchers):
+    """A joint choice of some characters, by their number, and what C is given for it."""
+    name, rain, table = rng.choice(list(searchers)), rng.random() < 0.5, meeting_table()
+    searcher, options, way = searchers[name], {}, rng.choice([0, 1, 2, 2, 2, 3])
+    numbers = [list(searchers).index(name), len(members), *members, way, *([rain] if way in (1, 2) else [])]
+    if way == 1:
+        facts = {f"{role}.{fact}": rng.choice(values) for role, (fact, values) in ROLES.items()}
+        options["valid"] = table.query({"rain": rain, **facts})
+        numbers += map(number_of, facts.values())
+    elif way == 2:
+        offers = offers_for(rng, range(len(members)))
+        options["valid"] = table.query({"rain": rain}, actors=offers)
+        each = [(list(ROLES).index(role), one["id"], one[ROLES[role][0]]) for role, own in offers.items() for one in own]
+        numbers += [len(each), *(number_of(number) for one in each for number in one)]
+    elif way == 3:
+        rows = rng.sample(range(6), 3)
+        assets = {MEETING_COLUMNS["Asset Name"][row] for row in rows}
+        options["valid"] = {each: np.array([a in assets for a in own.assets]) for each, own in searcher.databases.items()}
+        numbers.append(sum(1 << row for row in rows))
+    gives = rng.choice([None, (1.0, 1.0), (0.0, 1.0), (0.5, 3.0)])
+    if gives is not None:
+        options["gives"] = dict(zip(JOINT_ROLES, gives, strict=True))
+    every = list(permutations(range(len(members)), 2))
+    casts = rng.sample(every, rng.randint(0, len(every))) if rng.random() < 0.3 else None
+    if casts is not None:
+        options["casts"] = [dict(zip(JOINT_ROLES, cast, strict=True)) for cast in casts]
+    options["in_match_range"] = rng.random() < 0.3
+    ways, costs = [0, 0, rng.choice([0, 0, 0, 1, 3, 4, 5])], [0.0, 0.0, 0.5]
+    if ways[2]:
+        options["tags"] = motion.TagFilter(
+            **{[0, "include", "every", "exclude", "prefer", "avoid"][ways[2]]: "Hit" if ways[2] < 4 else {"Hit": 0.5}}
+        )
+    listed = [actor for cast in casts or () for actor in cast]
+    numbers += [gives is not None, *(gives or (1.0, 1.0)), casts is not None, len(casts or ()), *listed]
+    return name, options, [*numbers, options["in_match_range"], *ways, *costs]
+
+
+def met(rng, members, free, searchers):
+    """A joint choice of those who are free: a one-off for each who plays it, what C is given, and what it is to write."""
+    name, options, numbers = meeting(rng, free, searchers)
+    is_played = rng.random() < 0.3
+    queries = {i: members[at].features() for i, at in enumerate(free)}
+    roots = {i: members[at].root for i, at in enumerate(free)}
+    places = {i: (root.left_m, root.ahead_m, root.turn_rad) for i, root in roots.items()}
+    hit = searchers[name].search(queries, places, **options)
+    row = -1 if hit.row is None else hit.row
+    cast = [hit.cast[role] for role in JOINT_ROLES] if hit else [-1, -1]
+    plays = motion.JointNode(searchers[name]).play(hit, places).plays if hit and is_played else {}
+    once = {free[hit.cast[role]]: motion.OneOff(members[free[hit.cast[role]]], play, hit.database) for role, play in plays.items()}
+    given = struct.pack(f"q{len(numbers) + 1}d", len(numbers) + 1, is_played, *numbers)
+    return once, given, struct.pack("6d", hit.range, hit.frame, row, hit.cost, *cast)
 
 
 def session(rng, n_ticks, is_captured=False):
     """A bundle, what characters are given in it, and what Python makes of that."""
     controller, schema, banks, output = drawn(rng, is_captured)
+    searchers, tables = {}, {"moves": file_of("moves", table(is_captured))}
+    if not is_captured:
+        joint, joint_banks = joint_parts(next(ways for ways in WAYS if parts(ways, False)[0] is schema))
+        banks, tables["meetings"] = {**banks, **joint_banks}, file_of("meetings", meeting_table())
+        searchers["contest"] = motion.JointSearcher(joint, {"tired": rng.choice([0.3, 1.0, 3.0])})
+        searchers["greetings"] = motion.JointSearcher({"greetings": joint["greetings"]})
     databases, weights = controller.selector.databases, rng.choice([(1.0, 1.0), (20.0, 0.0), (0.0, 5.0)])
     nodes = {name: motion.MatchNode(databases[name], position_weight=weights[0], rotation_weight=weights[1]) for name in databases}
     played = Played(controller, schema, banks, output, {name: node.ends for name, node in nodes.items()})
     banks = moving_alike(banks)
-    bundle = bundle_of({"player": played}, {"turns": "moves", "all": "moves"}, {"moves": file_of("moves", table(is_captured))})
+    table_of = {"turns": "moves", "all": "moves", "tired": "meetings", "greetings": "meetings"}
+    bundle = bundle_of({"player": played}, table_of, tables, searchers)
     n, ground = rng.randint(1, 4), rng.choice([None, slope, stairs])
     members = [
         motion.Character(controller.copy(), schema, table(is_captured), motion.PoseStream(banks, output), ground=ground)
@@ -201,7 +333,12 @@ def session(rng, n_ticks, is_captured=False):
             is_going_on = events[i] is not None and left_s > 0.0
             events[i] = (name, max(left_s - dt, 0.0)) if is_going_on or rng.random() < 0.04 else None
         gaits = ["Idle" if not math.hypot(*stick) else "Walk" if math.hypot(*stick) < 2.0 else "Run" for stick in sticks]
-        entering = [i for i in range(n) if once[i] is None and rng.random() < 0.03]
+        meetings, told, free = [], b"", [i for i in range(n) if once[i] is None]
+        if searchers and len(free) > 1 and rng.random() < 0.3:
+            joined, numbers, told = met(rng, members, free, searchers)
+            meetings.append(numbers)
+            once = [joined.get(i, one) for i, one in enumerate(once)]
+        entering = [i for i in range(n) if once[i] is None and rng.random() < 0.08]
         entries = [(i, *entered(rng, members[i], sticks[i], gaits[i], nodes)) for i in entering]
         for i, one, _ in entries:
             once[i] = one
@@ -214,13 +351,13 @@ def session(rng, n_ticks, is_captured=False):
         else:
             updates = crowd.update(dt, sticks, {"gait": gaits}, event=events)
         once = [None if one is None or one.is_done else one for one in once]
-        given.append(struct.pack("dqq", dt, [None, slope, stairs].index(ground), len(entries)))
+        given.append(struct.pack("dqqq", dt, [None, slope, stairs].index(ground), len(entries), len(meetings)))
         for stick, facing, event, updated in zip(sticks, facings, events, updates, strict=True):
             number = CONDITIONS["gait"]["values"].index(updated.facts["gait"])
             event_number, in_s = (-1, 0.0) if event is None else (EVENTS.index(event[0]), event[1])
             given.append(struct.pack("3dqqd", *stick, facing, number, event_number, in_s))
-        given += [struct.pack("7d", i, *numbers) for i, _, numbers in entries]
-        states = b"".join(one.state for one in crowd)
+        given += meetings + [struct.pack("18d", i, *numbers) for i, _, numbers in entries]
+        states = told + b"".join(one.state for one in crowd)
         poses = [updated.pose for updated in updates]
         numbers = [(np.array(pose.root), pose.rotations, pose.translations, pose.positions) for pose in poses]
         packets = b"".join(bytes([len(packet)]) + packet for packet in (one.pack() for one in crowd))

@@ -13,11 +13,12 @@ def read(**part):
 def test_settings_are_read_from_the_project():
     keys = {"search_every_s": 0.0, "jump_threshold_s": 0.5, "history_s": 1, "variation_within": 0.05, "variation_memory": 2}
     found, faults = read(**keys)
-    assert found == [("player", "loco", ControllerSettings(0.0, 0.5, 1.0, Variation(0.05, 2)))]
+    assert found == [("player", "loco", (), ControllerSettings(0.0, 0.5, 1.0, Variation(0.05, 2)))]
     assert faults == []
     guards = {"cost_bar": 2, "grace_s": 0.5, "until_natural": True}
-    assert read(**guards)[0] == [("player", "loco", ControllerSettings(**guards))]
-    assert read()[0] == [("player", "loco", ControllerSettings())]
+    assert read(**guards)[0] == [("player", "loco", (), ControllerSettings(**guards))]
+    assert read()[0] == [("player", "loco", (), ControllerSettings())]
+    assert read(joint=["tackles", "greetings"])[0] == [("player", "loco", ("tackles", "greetings"), ControllerSettings())]
 
 
 def test_an_unknown_selector_and_a_memory_without_variation_are_reported():

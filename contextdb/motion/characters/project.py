@@ -52,12 +52,13 @@ class Parts:
         config = MotionConfig.from_dict(project.schema.motion, tables=project.tables, file=project.schema.file)
         names = config.databases_of(config.selector_of(controller))
         features = config.databases[names[0]].features
-        sharing = [name for name, each in config.databases.items() if each.features == features]
+        joint = config.joint_databases_of(controller) if poses else []
+        sharing = [name for name, each in config.databases.items() if each.features == features or name in joint]
         table_of = {name: table for name in sharing if (table := config.databases[name].table) is not None}
         compiled = {table: project.tables[table].compile() for table in dict.fromkeys(table_of.values())}
         assets: dict[str, Sequence[str]] = {table: each.leaves for table, each in compiled.items()}
         databases = open_or_build(config, project.folder, assets, names=sharing)
-        banks = banks_of(config, project.folder, assets, {name: databases[name] for name in names}) if poses else None
+        banks = banks_of(config, project.folder, assets, {name: databases[name] for name in (*names, *joint)}) if poses else None
         tables = {name: compiled[table_of[name]] for name in names if name in table_of}
         return cls(config, databases, banks, tables, config.features[features])
 

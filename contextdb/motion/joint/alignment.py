@@ -5,15 +5,15 @@ the clip has him, and the squared radians (of the chord) between the headings, a
 error; a role that gives way `g` times as readily as another makes up `g` times as much of a difference between them, and one that
 gives way by 0 makes up none.
 
-Places are (x, z, heading): metres and radians, as in `MotionDatabase.root`. K roles.
+Places are (x, z, heading): metres and radians, as in `MotionDatabase.root`. K roles. The sums are the core's meeting.h.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from contextdb.core import align
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.trajectory import to_own_frame
 from contextdb.motion.selection.root_motion import RootMotion, between
 
 
@@ -22,19 +22,9 @@ def aligned(recorded: Floats, places: Floats, gives: Floats) -> Floats:
 
     `gives` [K] is how readily each role gives way. Where none does, all give way alike.
     """
-    if not gives.any():
-        gives = np.ones(len(gives))
-    still = gives == 0.0
-    weights = np.where(still, 1.0, 0.0) if still.any() else 1.0 / gives
-    weights = weights / weights.sum()
-    centre, recorded_centre = weights @ places[:, :2], weights @ recorded[:, :2]
-    there, here = places[:, :2] - centre, recorded[:, :2] - recorded_centre
-    turns = places[:, 2] - recorded[:, 2]
-    sine = weights @ (here[:, 1] * there[:, 0] - here[:, 0] * there[:, 1] + np.sin(turns))
-    cosine = weights @ (here[:, 0] * there[:, 0] + here[:, 1] * there[:, 1] + np.cos(turns))
-    turn = float(np.arctan2(sine, cosine))
-    put = centre + to_own_frame(recorded[:, :2] - recorded_centre, np.full(len(recorded), -turn))
-    return np.column_stack((put, recorded[:, 2] + turn))
+    put = np.empty((len(recorded), 3))
+    align(np.ascontiguousarray(recorded), np.ascontiguousarray(places), np.asarray(gives, np.float64), put)
+    return put
 
 
 def moved(place: Floats, wanted: Floats) -> RootMotion:

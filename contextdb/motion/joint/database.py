@@ -25,18 +25,15 @@ from typing import NamedTuple
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_many, require_text
+from contextdb.core import see_others
 from contextdb.errors import Fault, MotionError, in_quotes, nearest, plural, some
 from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
-from contextdb.motion.clips.trajectory import to_own_frame
 from contextdb.motion.features.channels import require_weight
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.layout import Features
 
-UNIT_M = 0.5
-"""So many metres count as much as the usual spread of a feature."""
-UNIT_FACING = 0.5
 N_RELATIVE = 4
 """Features of one role seen by another: left, ahead, and the facing to the left and ahead."""
 PLACE = slice(0, 2)
@@ -196,9 +193,10 @@ class JointDatabase:
 
 def seen_by(places: Floats, others: Floats) -> Floats:
     """Places [..., 3] (x, z, heading) as other bodies see them, in the units of costs: [..., 4]."""
-    way = to_own_frame(others[..., :2] - places[..., :2], places[..., 2]) / UNIT_M
-    turn = others[..., 2] - places[..., 2]
-    return np.concatenate((way, np.stack((np.sin(turn), np.cos(turn)), axis=-1) / UNIT_FACING), axis=-1)
+    one, other = (np.array(each, np.float64) for each in np.broadcast_arrays(places, others))
+    seen = np.empty((*one.shape[:-1], N_RELATIVE))
+    see_others(one.reshape(-1, 3), other.reshape(-1, 3), seen.reshape(-1, N_RELATIVE))
+    return seen
 
 
 def divided(name: str, roles: Sequence[str]) -> tuple[str, str]:

@@ -12,7 +12,7 @@ warp range of Remedy's.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from enum import IntFlag
 from functools import cached_property, lru_cache
@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contextdb.bitmask import read_only
+from contextdb.core import filter_kinds
 from contextdb.errors import QueryError, no_such, some
 from contextdb.motion.arguments import Flags, frame_of
 from contextdb.motion.clips.quaternions import Floats
@@ -132,7 +133,7 @@ class Marks:
     @cached_property
     def _tag_biases(self) -> Callable[[TagFilter], Floats]:
         known = _Tags(self.tags, self.kind_tags)
-        return lru_cache(KEPT_FILTERS)(lambda tags: read_only(_tag_biases(known, tags)))
+        return lru_cache(KEPT_FILTERS)(lambda tags: read_only(known.filtered(tags)[1]))
 
     @cached_property
     def _moves_all(self) -> bool:
@@ -213,38 +214,31 @@ class _Tags:
 
     def has(self, tag: str) -> Flags:
         """Which kinds have a tag or one below it: bool [K]."""
-        at = [i for i, known in enumerate(self.names) if covers(tag, known)]
-        if not at:
+        return self.filtered(TagFilter(tag))[0]
+
+    def filtered(self, tags: TagFilter) -> tuple[Flags, Floats]:
+        """Which kinds a filter lets pass, and what it adds to the cost of frames of each: bool and float64 [K]."""
+        passes, added = np.empty(len(self.flags), np.bool_), np.empty(len(self.flags))
+        soft = [
+            part for costs in (tags.prefer, tags.avoid) for part in (_texts(t for t, _ in costs), np.array([c for _, c in costs]))
+        ]
+        hard = map(_texts, (tags.include, tags.every, tags.exclude))
+        if not filter_kinds(_texts(self.names), np.ascontiguousarray(self.flags), *hard, *soft, passes, added):
+            tag = next(tag for tag in tags.names if not any(covers(tag, known) for known in self.names))
             accepted = some(self.names) or "none: the markup has no tags"
             raise QueryError(no_such("tag", tag, self.names, accepted))
-        return np.asarray(self.flags[:, at].any(axis=1))
+        return passes, added
 
-    def passes(self, tags: TagFilter) -> Flags:
-        """Which kinds a filter lets pass: bool [K]."""
-        passes = np.ones(len(self.flags), np.bool_)
-        if tags.include:
-            passes &= np.any([self.has(tag) for tag in tags.include], axis=0)
-        for tag in tags.every:
-            passes &= self.has(tag)
-        for tag in tags.exclude:
-            passes &= ~self.has(tag)
-        return passes
+
+def _texts(texts: Iterable[str]) -> bytes:
+    return b"".join(text.encode("utf-8", "surrogatepass") + b"\0" for text in texts)
 
 
 def _left_out(known: _Tags, marks: NDArray[np.uint8], tags: TagFilter, in_match_range: bool) -> NDArray[np.uint8]:
     reasons = np.zeros(len(marks), np.uint8)
     if in_match_range:
         reasons[(marks & Mark.MATCH_RANGE) == 0] = LeftOut.MATCH_RANGE
-    reasons[~known.passes(tags)] = LeftOut.TAGS
+    reasons[~known.filtered(tags)[0]] = LeftOut.TAGS
     for mark, why in _REASONS:
         reasons[(marks & mark) != 0] = why
     return reasons
-
-
-def _tag_biases(known: _Tags, tags: TagFilter) -> Floats:
-    added = np.zeros(len(known.flags))
-    for tag, cost in tags.prefer:
-        added[~known.has(tag)] += cost
-    for tag, cost in tags.avoid:
-        added[known.has(tag)] += cost
-    return added

@@ -7,30 +7,34 @@ the earliest of these ranges; without any, or behind the contact, the blending l
 
 All roles have one time: a frame is the same frame for each of them.
 
-K roles. Times are seconds. Source: the match node of Remedy's talk, for several.
+K roles. Times are seconds. The loops are the core's meeting.h. Source: the match node of Remedy's talk, for several.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Unpack
 
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_real, require_text, require_whole
+from contextdb.core import Controllers, begin_roles
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, some
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.joint.hit import JointHit
 from contextdb.motion.joint.searcher import JointOptions, JointSearcher, Places, Queries, places_of
-from contextdb.motion.markup.span_faults import TOLERANCE_S
 from contextdb.motion.nodes.match_node import MatchCosts, MatchPlay
 from contextdb.motion.nodes.warping import Target, Window, warped
 from contextdb.motion.search.hit import Hit
+from contextdb.motion.selection.chooser import Chooser
+from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.decision import Action, Decision, Together
 from contextdb.motion.selection.playhead import Playhead
-from contextdb.motion.selection.root_motion import RootMotion, between
+from contextdb.motion.selection.root_motion import RootMotion
+from contextdb.motion.selection.selector import Entry, Selector
 
 
 @dataclass(eq=False)
@@ -156,46 +160,32 @@ class JointNode:
         joint = self.searcher.databases.get(str(hit.database)) if hit else None
         if joint is None:
             raise QueryError(Fault("there is nothing to play.", "a hit of this node's searcher"))
-        last = _last_frame(joint, hit)
-        window = _window(joint, hit, (last - hit.frame) / _rate(joint))
         here = places_of(places, [hit.cast[role] for role in joint.roles])
+        put, targets = np.array([hit.places[role] for role in joint.roles]), np.empty((len(joint.roles), 3))
+        ranges, warps = np.ascontiguousarray(joint.ranges[hit.range]), joint.database.marks.warps
+        last, *window = begin_roles(self._cores[str(hit.database)], ranges, hit.frame, warps, put, here, targets)
+        n_frames = last + 1 - hit.frames[joint.roles[0]]
+        each = zip(joint.roles, (Target(*numbers) for numbers in targets.tolist()), strict=True)
+        plays = {role: _play(joint, hit, k, n_frames, target, Window(*window)) for k, (role, target) in enumerate(each)}
         starts = {role: RootMotion(*place) for role, place in zip(joint.roles, here.tolist(), strict=True)}
-        plays = {role: _play(joint, hit, k, last, starts[role], window) for k, role in enumerate(joint.roles)}
-        return JointPlay(hit, plays, starts, window.to_s)
+        return JointPlay(hit, plays, starts, window[1])
+
+    @cached_property
+    def _cores(self) -> dict[str, Controllers]:
+        databases = ((name, joint.database) for name, joint in self.searcher.databases.items())
+        return {name: Chooser(Selector([Entry(name, each)]), ControllerSettings()).core for name, each in databases}
 
 
-def _play(joint: JointDatabase, hit: JointHit, k: int, last: int, start: RootMotion, window: Window) -> MatchPlay:
+def _play(joint: JointDatabase, hit: JointHit, k: int, n_frames: int, target: Target, window: Window) -> MatchPlay:
     """The path of one role's actor, from where he is to where the clip, put down in the world, has him at the contact."""
     database, role, rate = joint.database, joint.roles[k], _rate(joint)
     assert database.root is not None, "checked when the joint database was made"
     at, frame = int(joint.ranges[hit.range, k]), hit.frames[role]
-    path = database.root[frame : frame + last - hit.frame + 1].astype(np.float64)
-    path[:, 2] = np.unwrap(path[:, 2])
-    times_s = np.arange(len(path)) / rate
-    contact = RootMotion(*(float(np.interp(window.to_s, times_s, column)) for column in path.T))
-    there = RootMotion(*hit.places[role]).then(between(RootMotion(*path[0].tolist()), contact))
-    target = Target.seen_from(start, there.left_m, there.ahead_m, there.turn_rad)
+    path = database.root[frame : frame + n_frames].astype(np.float64)
     own = Hit(database.assets[at], at, frame, math.fsum(hit.costs[role].values()))
     costs = MatchCosts(hit.costs[role], 0.0, 0.0, 0.0)
-    return MatchPlay(own, target, costs, warped(times_s, path, window, window, target), Playhead(database, at, rate))
-
-
-def _last_frame(joint: JointDatabase, hit: JointHit) -> int:
-    """The last frame of a joint range that playing on from a hit leads to: before the first that is excluded in any role."""
-    first, marks = int(joint.firsts[hit.range]), joint.database.marks
-    length = int(joint.lengths[hit.range])
-    frames = joint.frames[:, first + hit.frame + 1 : first + length]
-    playable = marks.playable()[marks.kinds[frames]].all(axis=0)
-    return hit.frame + (len(playable) if playable.all() else int(np.argmin(playable)))
-
-
-def _window(joint: JointDatabase, hit: JointHit, last_s: float) -> Window:
-    """When the actors are brought together, in seconds since the entry; up to the last frame where there is no contact ahead."""
-    warps = joint.database.marks.warps[joint.ranges[hit.range]] - hit.frame / _rate(joint)
-    if np.isnan(warps).all() or np.nanmin(warps[..., 1]) <= TOLERANCE_S:
-        return Window(0.0, last_s)
-    contact_s = min(float(np.nanmin(warps[..., 1])), last_s)
-    return Window(min(max(0.0, float(np.nanmin(warps[..., 0]))), contact_s), contact_s)
+    there = warped(np.arange(n_frames) / rate, path, window, window, target)
+    return MatchPlay(own, target, costs, there, Playhead(database, at, rate))
 
 
 def _rate(joint: JointDatabase) -> float:

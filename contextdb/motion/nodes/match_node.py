@@ -9,8 +9,15 @@ these two costs as biases: exact, among the frames of match ranges alone.
 
 The chosen animation plays from its frame up to the end of its range, a looping one too, or to the frame before an excluded one.
 
+A *stitch* has no target: it is the shortest part of an animation that begins near one pose and ends near another.
+
+    cost of a part = cost of its first frame for the old pose, and its biases + cost of its last frame for the new one
+
+The loops are the core's nodes.h, which games enter one-offs with.
+
 N frames. Source: "Match Node", "Candidate End Points" and "Distance To Target Cost" in EA's talk; the match node of Remedy's, whose
-match range says where an animation can be started and whose warp range says in which frames it is warped.
+match range says where an animation can be started and whose warp range says in which frames it is warped; the stitch databases of
+Unreal's PoseSearch, which put a clip between two others under a greatest cost.
 """
 
 from __future__ import annotations
@@ -25,21 +32,19 @@ from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind, require_text
 from contextdb.cells.row_play import RowPlay
-from contextdb.core import aim
+from contextdb.core import Controllers, aim, begin_one_off, forbid_others, shortest_part, write_ends
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes
 from contextdb.motion.answers import is_answer
 from contextdb.motion.arguments import Valid, ValidRanges
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.skeleton import Ints
-from contextdb.motion.clips.trajectory import to_own_frame
 from contextdb.motion.features.channels import require_weight
 from contextdb.motion.markup.span_faults import TOLERANCE_S
-from contextdb.motion.nodes.stitching import shortest_part
 from contextdb.motion.nodes.warping import Target, WarpedPath, WarpShare, Window, warped
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.search.filtering import Penalties, Tags
 from contextdb.motion.search.hit import Hit
+from contextdb.motion.search.searcher import shared_parts
 from contextdb.motion.selection.chooser import Chooser, Ranges
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.decision import Action, Decision
@@ -252,13 +257,8 @@ class MatchNode:
     ) -> MatchPlay:
         """Start at a frame that `search` has found with the same arguments."""
         ranges = self._ranges(valid)
-        how = None if ranges is None or ranges.plays is None else ranges.plays.of_range(hit.range)
-        rate = 1.0 if how is None else how.rate
         costs = self._costs(hit, query, target, self._valid(valid, ranges), **options)
-        frames = np.arange(hit.frame, self._last[hit.frame] + 1)
-        position, rotation = (Window(*each) for each in (self._windows(frames[:1])[0] / rate).tolist())
-        path = warped((frames - hit.frame) / (self.rate * rate), self._root[frames], position, rotation, target)
-        return MatchPlay(hit, target, costs, path, Playhead(self.database, hit.range, self.rate), how=how, play_rate=rate)
+        return self._entered(hit, target, costs, ranges)
 
     def stitch(
         self, query: ArrayLike, after: ArrayLike, most_cost: float, valid: Valid | None = None, **options: Unpack[MatchOptions]
@@ -281,31 +281,47 @@ class MatchNode:
         QueryError
             As from `MotionDatabase.search`, or a cost that is none.
         """
+        most = as_number(most_cost)
+        if most is None or not most >= 0.0:
+            raise QueryError(Fault(f"the most that a part may cost is {most_cost!r}.", "a cost, 0 or more"))
         ranges = self._ranges(valid)
-        bias = self._start_bias(ranges) + np.zeros(self.database.n_frames)
+        bias = self._start_bias(ranges)
         chosen = self.database.filter(self._valid(valid, ranges), bias=bias, in_match_range=True, **options)
-        part = shortest_part(self.database, query, after, most_cost, chosen, self._last)
-        if part is None:
-            return None
+        for each in (query, after):
+            self.database.normalised(each)  # says what is wrong
+        old, new = (np.ascontiguousarray(each, np.float64) for each in (query, after))
+        part = shortest_part(self._core, old, chosen.ranges, chosen.range_biases, *shared_parts(chosen), new, most)
+        assert part is not None, "they were checked"
         first, last, total = part
+        if first < 0:
+            return None
         at = self.database.range_of(first)
         hit = Hit(self.database.assets[at], at, first, total)
-        how = None if ranges is None or ranges.plays is None else ranges.plays.of_range(at)
-        rate, frames = 1.0 if how is None else how.rate, np.arange(first, last + 1)
-        path, still = _path(self._root, frames), Window(0.0, 0.0)
-        (left, ahead), turn = to_own_frame(path[-1:, :2] - path[0, :2], path[0, 2])[0].tolist(), path[-1, 2] - path[0, 2]
-        target = Target(left, ahead, float(turn))
         ends = self.database.channel_costs(hit, query), self.database.channel_costs(replace(hit, frame=last), after)
         motion = {name: own + ends[1][name] for name, own in ends[0].items()}
-        costs = MatchCosts(motion, 0.0, 0.0, total - math.fsum(motion.values()))
-        there = warped((frames - first) / (self.rate * rate), path, still, still, target)
-        return MatchPlay(hit, target, costs, there, Playhead(self.database, at, self.rate), how=how, play_rate=rate)
+        return self._entered(hit, None, MatchCosts(motion, 0.0, 0.0, total - math.fsum(motion.values())), ranges, last)
+
+    def _entered(self, hit: Hit, target: Target | None, costs: MatchCosts, ranges: Ranges | None, last: int = -1) -> MatchPlay:
+        """An animation that was entered at a frame: to a target, or as it is up to its last frame."""
+        how = None if ranges is None or ranges.plays is None else ranges.plays.of_range(hit.range)
+        numbers, windows = np.zeros(3) if target is None else target.numbers, np.empty((2, 2))
+        play = None if how is None else np.array(how.numbers)
+        warps = self.database.marks.warps[hit.range]
+        last, rate = begin_one_off(self._core, hit.range, hit.frame, last, play, warps, numbers, windows)
+        frames, target = np.arange(hit.frame, last + 1), target or Target(*numbers.tolist())
+        position, rotation = (Window(*each) for each in windows.tolist())
+        path = warped((frames - hit.frame) / (self.rate * rate), self._root[frames], position, rotation, target)
+        return MatchPlay(hit, target, costs, path, Playhead(self.database, hit.range, self.rate), how=how, play_rate=rate)
 
     # ---- how the rows of an answer play
 
     @cached_property
     def _chooser(self) -> Chooser:
         return Chooser(Selector([Entry("", self.database)]), ControllerSettings(rate=self.rate))
+
+    @property
+    def _core(self) -> Controllers:
+        return self._chooser.core
 
     def _ranges(self, valid: Valid | None) -> Ranges | None:
         """Which ranges an answer lets play, and how; None for what does not say how."""
@@ -316,18 +332,11 @@ class MatchNode:
     def _valid(self, valid: Valid | None, ranges: Ranges | None) -> Valid | None:
         return valid if ranges is None else ValidRanges(ranges.flags[0], ranges.biases[0])
 
-    def _start_bias(self, ranges: Ranges | None) -> Floats | float:
-        """What forbids all frames of ranges but that at which their row says that they are entered."""
-        if ranges is None or ranges.plays is None:
-            return 0.0
+    def _start_bias(self, ranges: Ranges | None) -> Floats:
+        """What forbids all frames of ranges but that at which their row says that they are entered: float64 [N]."""
         bias = np.zeros(self.database.n_frames)
-        for at in np.flatnonzero(ranges.flags[0]).tolist():
-            how = ranges.plays.of_range(at)
-            if how is not None and how.start_s is not None:
-                own = slice(int(self.database.starts[at]), int(self.database.stops[at]))
-                entry = Playhead(self.database, at, self.rate).frame_at(how.start_s)
-                bias[own] = np.inf
-                bias[entry] = 0.0
+        if ranges is not None and ranges.plays is not None:
+            forbid_others(self._core, ranges.plays.rows, ranges.plays.of[0], bias)
         return bias
 
     def target_costs(self, target: Target) -> tuple[Floats, Floats]:
@@ -343,41 +352,10 @@ class MatchNode:
         The place is that at the end of the positional warp range, the turn that at the end of the rotational one; of a frame that
         has no time left there, that at the end of its animation.
         """
-        frames = self.database.layout.frames
-        path, places = _path(self._root, frames), np.zeros(self.database.n_frames, np.int64)
-        places[frames] = np.arange(len(frames))
-        windows = self._windows(frames)
-        lasts = (self._last[frames] - frames) / self.rate
-        is_open = windows[:, :, 1] - windows[:, :, 0] > TOLERANCE_S
-        arrivals = np.where(is_open, windows[:, :, 1], lasts[:, None])
-        rows, last_rows = np.arange(len(frames)), places[self._last[frames]]
-        there, turned = (_path_at(path, rows + arrivals[:, i] * self.rate, last_rows) for i in (0, 1))
-        ends = np.zeros((self.database.n_frames, 3))
-        ends[frames, :2] = to_own_frame(there[:, :2] - path[:, :2], path[:, 2])
-        ends[frames, 2] = turned[:, 2] - path[:, 2]
+        ends = np.empty((self.database.n_frames, 3))
+        write_ends(self._core, self.database.marks.warps, ends)
         ends.flags.writeable = False
         return ends
-
-    def _windows(self, frames: Ints) -> Floats:
-        """The warp windows of position and rotation left to each frame, from and to in seconds since the frame: [n, 2, 2].
-
-        One that ends before it begins has no time left. A warp range of NaN is as long as the animation.
-        """
-        ranges = self.database.layout.frame_ranges[frames]
-        own_s = (frames - self.database.starts[ranges]) / self.rate
-        lasts_s = (self._last[frames] - frames) / self.rate
-        since = self.database.marks.warps[ranges] - own_s[:, None, None]
-        return np.stack((np.fmax(since[:, :, 0], 0.0), np.fmin(since[:, :, 1], lasts_s[:, None])), axis=-1)
-
-    @cached_property
-    def _last(self) -> Ints:
-        """The last frame that playing on from each leads to: int64 [N]."""
-        ranges, n_frames = self.database.layout.frame_ranges, self.database.n_frames
-        playable = self.database.marks.playable()[self.database.marks.kinds] & (ranges >= 0)
-        goes_on = np.zeros(n_frames, np.bool_)
-        goes_on[:-1] = playable[1:] & (ranges[1:] == ranges[:-1])
-        stops = np.where(goes_on, n_frames, np.arange(n_frames))
-        return np.asarray(np.minimum.accumulate(stops[::-1])[::-1])
 
     def _target_costs(self, ends: Floats, target: Target) -> tuple[Floats, Floats]:
         distances, rotations = np.empty(len(ends)), np.empty(len(ends))
@@ -400,24 +378,6 @@ class MatchNode:
             float(rotations[0]),
             float(chosen.range_biases[hit.range] + chosen.kinds.biases[self.database.marks.kinds[hit.frame]]),
         )
-
-
-# ---- paths
-
-
-def _path(root: Floats, frames: Ints) -> Floats:
-    """The path of some frames, their headings unwrapped: float64 [n, 3]."""
-    path = root[frames].astype(np.float64)
-    path[:, 2] = np.unwrap(path[:, 2])
-    return path
-
-
-def _path_at(path: Floats, rows: Floats, last_rows: Ints) -> Floats:
-    """A path [n, 3] at fractional rows, each at most its last row: [n, 3]."""
-    low = np.minimum(rows.astype(np.int64), last_rows)
-    high = np.minimum(low + 1, last_rows)
-    shares = np.clip(rows - low, 0.0, 1.0)[:, None]
-    return np.asarray(path[low] * (1.0 - shares) + path[high] * shares)
 
 
 # ---- checks

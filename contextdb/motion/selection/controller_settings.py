@@ -14,7 +14,7 @@ from typing import Any
 
 from contextdb.errors import Fault, MotionError, in_quotes
 from contextdb.files.settings import Declared, Section, Setting, flag, number, settings_of
-from contextdb.files.toml_shapes import Mapped, filled, one_of
+from contextdb.files.toml_shapes import Mapped, Shape, filled, one_of
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.variation import Variation
 
@@ -90,8 +90,23 @@ class ControllerSettings(Declared, error=MotionError):
 
 
 _VARIATION = {f"variation_{key}": each for key, each in settings_of(Variation).items()}
+
+
+def _wrong_names(value: object) -> str | None:
+    listed = value if isinstance(value, (list, tuple)) else ()
+    is_good = bool(listed) and all(isinstance(name, str) and name for name in listed) and len(set(listed)) == len(listed)
+    return None if is_good else "these are not names, each once"
+
+
 CONTROLLER = {
     "selector": Setting(filled("the name of a [selectors.NAME]"), "The name of a selector."),
+    "joint": Setting(
+        Shape('names of selectors or databases with roles, each once, such as ["tackles"]', _wrong_names, read=tuple),
+        "Joint clips that its characters may be cast for: their characters and bundles have the poses.",
+        (),
+        more="See [joint clips](motion.md#several-characters-at-once).",
+        without="none",
+    ),
     **{key: each for key, each in settings_of(ControllerSettings).items() if key != "rate"},
     **_VARIATION,
     "variation_within": replace(_VARIATION["variation_within"], default=None, without="none are"),
@@ -101,8 +116,8 @@ CONTROLLER = {
 
 def read_controllers(
     parts: Mapping[str, Mapped], selectors: Collection[str], faults: list[Fault], file: str | None
-) -> Iterator[tuple[str, str, ControllerSettings]]:
-    """Name, selector and settings of each part without a fault; the faults of the others are collected."""
+) -> Iterator[tuple[str, str, tuple[str, ...], ControllerSettings]]:
+    """Name, selector, names of joint clips and settings of each part without a fault; the faults of the others are collected."""
     for name, part in parts.items():
         n_faults = len(faults)
         section = Section(f"[controllers.{name}]", part, CONTROLLER, faults, file)
@@ -114,4 +129,5 @@ def read_controllers(
             section.add(problem, f"variation_within, {CONTROLLER['variation_within'].shape.accepted}")
         if len(faults) == n_faults:
             varied = {key.removeprefix("variation_"): values.pop(key) for key in _VARIATION if key in values}
-            yield name, values.pop("selector"), ControllerSettings(**values, variation=Variation(**varied) if varied else None)
+            names = values.pop("selector"), tuple(values.pop("joint", ()))
+            yield name, *names, ControllerSettings(**values, variation=Variation(**varied) if varied else None)

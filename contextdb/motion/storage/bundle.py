@@ -6,6 +6,7 @@ numbers are little-endian. R ranges, N frames, F features, K kinds of frames, J 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -17,15 +18,21 @@ from contextdb.errors import Fault, MotionError, Place, in_quotes
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.features.schema import FeatureSchema
+from contextdb.motion.joint.boxes import boxes_of
+from contextdb.motion.joint.database import JointDatabase
+from contextdb.motion.joint.searcher import JointSearcher
 from contextdb.motion.output.bank import PoseBank, moving_alike
-from contextdb.motion.output.pipeline import numbers_of, rig_parts
+from contextdb.motion.output.pipeline import Pipeline, numbers_of, rig_parts
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.search.database import MotionDatabase
+from contextdb.motion.selection.chooser import Chooser
 from contextdb.motion.selection.controller import Controller
+from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.events import events_of
+from contextdb.motion.selection.selector import Entry, Selector
 
 MAGIC = b"CDBMOTN1"
-DATABASE, BANK, CONTROLLER, TABLE = 1, 40, 60, 90
+DATABASE, BANK, CONTROLLER, TABLE, TAGS, MORE, JOINT, SET = 1, 40, 60, 90, 110, 120, 130, 160
 """The first kinds of the parts of each."""
 OUTPUT = (
     "blend", "halflife_s", "root", "position_weight", "rotation_weight", "position_pull_s", "rotation_pull_s",
@@ -33,6 +40,8 @@ OUTPUT = (
     "max_stride", "foot_lock", "foot_halflife_s", "foot_radius_m",
 )  # fmt: skip
 """The settings of poses in the order of the core, see pose.h."""
+MOST_ROLES = 8
+"""So many roles a joint clip may have in the core: CDB_MOST_ROLES in types.h."""
 Part = NDArray[Any] | bytes | None
 
 
@@ -43,7 +52,7 @@ class Played:
     controller: Controller
     schema: FeatureSchema
     banks: Mapping[str, PoseBank] | None
-    """None for characters without poses."""
+    """None for characters without poses. With those of the joint databases that they play."""
     output: PoseSettings
     ends: Mapping[str, Floats] = field(default_factory=dict)
     """`MatchNode.ends`, float64 [N, 3], of the databases whose animations can be entered as one-offs."""
@@ -98,31 +107,56 @@ class Bundle:
         return MAGIC + np.array([24 + len(head), digest], "<u8").tobytes() + head
 
 
-def bundle_of(players: Mapping[str, Played], table_of: Mapping[str, str], tables: Mapping[str, TableFile]) -> bytes:
-    """The bytes of a bundle of controllers by their names, the table of each database that has one, and the tables.
+def bundle_of(
+    players: Mapping[str, Played],
+    table_of: Mapping[str, str],
+    tables: Mapping[str, TableFile],
+    searchers: Mapping[str, JointSearcher] | None = None,
+) -> bytes:
+    """The bytes of a bundle of controllers by their names, the table of each database that has one, the tables, and the joint
+    searchers by their names.
 
     Raises MotionError for what a bundle cannot hold yet; all faults together.
     """
-    _check(players)
+    searchers = searchers or {}
+    _check(players, searchers)
     bundle, numbers, names = Bundle(), {name: i for i, name in enumerate(tables)}, list[str]()
+    joint = {name: (each, searcher.selector) for searcher in searchers.values() for name, each in searcher.databases.items()}
     banks = moving_alike({name: bank for player in players.values() for name, bank in (player.banks or {}).items()})
     for number, (name, table) in enumerate(tables.items()):
         bundle.add(TABLE, number, [table.octets, _texts([name]), *table.parts])
     for number, (name, player) in enumerate(players.items()):
+        banks_of, chooser = player.banks or {}, player.controller.chooser
+        more = [each for each in joint if each not in chooser.names and (player.banks is None or each in banks_of)]
         entries = []
-        for database in player.controller.chooser.names:
+        for database in (*chooser.names, *more):
+            of = table_of.get(database, "")
             if database not in names:
                 names.append(database)
-                _add_database(bundle, len(names) - 1, player, database, banks.get(database), tables.get(table_of.get(database, "")))
-            at, has_bank = names.index(database), player.banks is not None and database in player.banks
-            entries.append((at, at if has_bank else -1, numbers.get(table_of.get(database, ""), -1)))
-        own = [banks[each] for each in player.controller.chooser.names if player.banks is not None and each in player.banks]
-        bundle.add(CONTROLLER, number, _controller(name, player, entries, own))
+                bank, number_of = banks.get(database), len(names) - 1
+                if database in more:
+                    _add_joint(bundle, number_of, *joint[database], database, bank, tables.get(of))
+                else:
+                    _add_database(bundle, number_of, chooser, database, bank, tables.get(of), player.ends.get(database))
+            at = names.index(database)
+            entries.append((at, at if database in banks_of else -1, numbers.get(of, -1)))
+        own = [banks[each] for each in (*chooser.names, *more) if each in banks_of]
+        bundle.add(CONTROLLER, number, _controller(name, player, entries[: len(chooser.names)], own))
+        bundle.add(MORE, number, [np.array(entries[len(chooser.names) :], np.int64)])
+    sets = {name: each for name, each in searchers.items() if all(database in names for database in each.databases)}
+    for number, (name, searcher) in enumerate(sets.items()):
+        limits = [math.nan if each.threshold is None else each.threshold for each in searcher.selector.entries]
+        databases = [names.index(each) for each in searcher.databases]
+        bundle.add(SET, number, [_texts([name]), np.array(databases, np.int64), np.array(limits, np.float64)])
     return bytes(bundle)
 
 
-def _check(players: Mapping[str, Played]) -> None:
-    faults = []
+def _check(players: Mapping[str, Played], searchers: Mapping[str, JointSearcher]) -> None:
+    faults = [
+        Fault(f"the joint clips {in_quotes(name)} have {len(each.roles)} roles.", f"at most {MOST_ROLES} in a bundle")
+        for name, each in searchers.items()
+        if len(each.roles) > MOST_ROLES
+    ]
     for name, player in players.items():
         chooser, place = player.controller.chooser, Place(f"[controllers.{name}]")
         if player.controller.settings.variation is not None:
@@ -134,10 +168,44 @@ def _check(players: Mapping[str, Played]) -> None:
         ]
     if faults:
         raise MotionError(*faults)
+    for player in players.values():
+        if player.banks:
+            Pipeline(moving_alike(player.banks), player.output)  # refuses banks of different rigs
 
 
-def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: PoseBank | None, table: TableFile | None) -> None:
-    chooser = player.controller.chooser
+def _add_joint(
+    bundle: Bundle,
+    number: int,
+    joint: JointDatabase,
+    selector: Selector,
+    name: str,
+    bank: PoseBank | None,
+    table: TableFile | None,
+) -> None:
+    """A database, which of its ranges belong together, and what a joint search of it reads."""
+    boxes, database = boxes_of(joint), selector.databases[name]
+    chosen = database.filter(None)
+    rows: Sequence[Part] = (None, None)
+    if table is not None:
+        own = [[row for row, asset in enumerate(table.assets) if asset == each] for each in joint.assets]
+        rows = np.cumsum([0, *map(len, own)], dtype=np.int64), np.array([row for each in own for row in each], np.int64)
+    searched = boxes.boxes, boxes.ranges, boxes.firsts, boxes.own_lows, boxes.own_highs, boxes.relative, boxes.lows, boxes.highs
+    weights = np.array(joint.pairs, np.int64), joint.own_weights, np.array(joint.relative_weights)
+    biases = chosen.range_biases, chosen.kinds.biases, chosen.kinds.allowed
+    parts = [_texts(joint.roles), joint.ranges, *searched, *weights, *biases, database.marks.warps, joint.mirrored, *rows]
+    bundle.add(JOINT, number, parts)
+    _add_database(bundle, number, Chooser(Selector([Entry(name, database)]), ControllerSettings()), name, bank)
+
+
+def _add_database(
+    bundle: Bundle,
+    number: int,
+    chooser: Chooser,
+    name: str,
+    bank: PoseBank | None,
+    table: TableFile | None = None,
+    ends: Floats | None = None,
+) -> None:
     at = chooser.names.index(name)
     database = chooser.databases[at]
     assert database is not None, "it was checked"
@@ -152,11 +220,12 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
         row_starts, row_numbers, mirrored, _ = chooser.rows_of(name, table.assets)
         rows = mirrored, row_starts, row_numbers
     measures = kinds, offset, scale, channels, channel_weights, roots
-    nodes = (database.marks.warps, player.ends[name]) if name in player.ends else ()
+    nodes = () if ends is None else (database.marks.warps, ends)
     played = starts, stops, same, looping, root, marks, weights, own
     texts = _texts(database.assets), *rows, _texts([name])
     levels, events = _levels(database), _events(database)
     bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, *texts, *levels, *events, *nodes])
+    bundle.add(TAGS, number, [_texts(database.marks.tags), database.marks.kind_tags])
     if bank is not None:
         *frames, bank_rate = bank.frame_parts(bank.steps)
         bundle.add(BANK, number, [*frames, np.array([bank_rate])])

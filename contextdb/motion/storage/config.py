@@ -84,7 +84,8 @@ class SelectorSettings:
 class MotionConfig:
     """The sections `features`, `databases`, `selectors`, `controllers` and `output` of a contextdb.toml.
 
-    A controller is the name of its selector and its settings.
+    A controller is the name of its selector and its settings. `joint_clips` are, of controllers that have any, the names
+    of selectors and databases of joint clips that their characters may be cast for.
     """
 
     features: Mapping[str, FeatureSchema] = field(default_factory=dict)
@@ -93,6 +94,7 @@ class MotionConfig:
     controllers: Mapping[str, tuple[str, ControllerSettings]] = field(default_factory=dict)
     output: Mapping[str, PoseSettings] = field(default_factory=dict)
     file: str | None = None
+    joint_clips: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         sections = ("schema", self.features), ("database", self.databases), ("selector", self.selectors)
@@ -117,12 +119,14 @@ class MotionConfig:
             for settings in read_databases(parts["databases"], parts["features"], schemas, tables, faults, file)
         }
         selectors = dict(_read_selectors(parts, faults, file))
-        known = read_controllers(parts["controllers"], parts["selectors"], faults, file)
-        controllers = {name: (selector, settings) for name, selector, settings in known}
+        known = list(read_controllers(parts["controllers"], parts["selectors"], faults, file))
+        controllers = {name: (selector, settings) for name, selector, _, settings in known}
+        joint = {name: names for name, _, names, _ in known if names}
+        faults += _joint_faults(joint, databases, selectors, file)
         output = _collected(parts["output"], lambda name, part: PoseSettings.from_dict(part, name=name, file=file), faults)
         if faults:
             raise SchemaError(*faults)
-        return cls(schemas, databases, selectors, controllers, output, file)
+        return cls(schemas, databases, selectors, controllers, output, file, joint)
 
     def database(self, name: str) -> DatabaseSettings:
         """The settings of the database of a name; an unknown name raises SchemaError with the nearest."""
@@ -172,6 +176,19 @@ class MotionConfig:
                 problem = f"[selectors.{name}] has the database {in_quotes(database)} of clips that are cast and chosen together."
                 raise SchemaError(Fault(problem, JOINTLY, place=Place(self.file)))
         return Selector([Entry(database, databases.get(database), threshold) for database, threshold in settings.order])
+
+    def joint_databases_of(self, controller: str) -> list[str]:
+        """The databases of the joint clips that the characters of a controller may be cast for, each once."""
+        names = [each for name in self.joint_clips.get(controller, ()) for each in self._ordered(name)]
+        return list(dict.fromkeys(names))
+
+    def played_by(self, controller: str) -> list[str]:
+        """The databases whose poses the characters of a controller have: those of its selector and of its joint clips."""
+        return [*self.databases_of(self.selector_of(controller)), *self.joint_databases_of(controller)]
+
+    def _ordered(self, name: str) -> list[str]:
+        """The databases of a selector, in order, or the one of that name."""
+        return [name] if name not in self.selectors else self.databases_of(name)
 
     def joint(self, name: str, database: MotionDatabase) -> JointDatabase:
         """The joint clips of a built database whose settings name roles; see `JointDatabase.of` for what it raises."""
@@ -246,6 +263,26 @@ def _collected(parts: Mapping[str, Mapped], read: Callable[[str, Mapped], Part],
         except SchemaError as error:
             faults.extend(error.faults)
     return values
+
+
+def _joint_faults(
+    joint: Mapping[str, Sequence[str]],
+    databases: Mapping[str, DatabaseSettings],
+    selectors: Mapping[str, SelectorSettings],
+    file: str | None,
+) -> Iterator[Fault]:
+    """The names of joint clips that are none: of no selector and no database, or of databases without roles."""
+    for controller, names in joint.items():
+        where, place = f"[controllers.{controller}]", Place(file)
+        for name in names:
+            order = [each for each, _ in selectors[name].order] if name in selectors else [name]
+            if any(each not in databases for each in order):
+                known = list(dict.fromkeys((*selectors, *databases)))
+                problem = f"{where} joint: there is no selector and no database {in_quotes(name)}."
+                yield Fault(problem, some(known), mend_for(name, known), place)
+            elif without := [each for each in order if not databases[each].roles]:
+                problem = f"{where} joint: [databases.{without[0]}] has no roles."
+                yield Fault(problem, 'roles = ["Tackler", "Carrier"] in it', place=place)
 
 
 def _read_selectors(

@@ -23,7 +23,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from random import Random
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.mirroring import changed_in_mirror, mirrored_fact, partner_of, way_of
@@ -283,7 +282,7 @@ def bundled(tables: Mapping[str, Table], config: MotionConfig, databases: Mappin
         schema = config.features[config.databases[names[0]].features]
         own = {each: banks[each] for each in names if each in banks}
         ends = {each: MatchNode(databases[each]).ends for each in own}
-        controller = config.controller(name, databases, rng=Random(0))
+        controller = config.controller(name, databases)
         players[name] = Played(controller, schema, own or None, config.output_of(name), ends)
     return bundle_of(players, table_of, compiled)
 

@@ -459,6 +459,9 @@ class Controllers:
         settle_s: float,
         asset_history_s: float,
         until_natural: bool,
+        varies: bool,
+        vary_within: float,
+        n_recent: int,
     ) -> None: ...
     @property
     def width(self) -> int:

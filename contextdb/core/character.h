@@ -15,6 +15,7 @@
 
 #define CDBM_MOST_DATABASES 64
 #define CDBM_MOST_TABLES 16
+#define CDBM_MOST_RECENT 1000       /* so many assets may be remembered */
 #define CDBM_MOST_BELOW 16          /* so many feet may feel a ground */
 
 typedef struct cdbm_player {
@@ -203,7 +204,7 @@ static inline const char *cdbm_open_player(cdbm_player *player, const cdbm_bundl
     if (!cdbm_text(bundle, CDBM_P_CONTROLLER_NAME, number, 0)) return "the bundle has no controller of that name";
     entries = CDBM_TAKE_ALL(int64_t, CDBM_P_ENTRIES, &n_entries);
     settings = CDBM_TAKE_ALL(double, CDBM_P_SETTINGS, &n_settings);
-    if (n_entries % 3 || n_entries == 0 || n_entries / 3 > CDBM_MOST_DATABASES || n_settings != 13) cdbm_refuse(bundle, "a controller is damaged");
+    if (n_entries % 3 || n_entries == 0 || n_entries / 3 > CDBM_MOST_DATABASES || n_settings != 16) cdbm_refuse(bundle, "a controller is damaged");
     if (bundle->why) return bundle->why;
     n_entries /= 3;
     thresholds = CDBM_TAKE(double, CDBM_P_THRESHOLDS, n_entries), bars = CDBM_TAKE(double, CDBM_P_BARS, n_entries);
@@ -212,9 +213,10 @@ static inline const char *cdbm_open_player(cdbm_player *player, const cdbm_bundl
     to->until_natural = settings[7] != 0.0, player->has_poses = settings[8] != 0.0;
     player->velocity_halflife_s = player->heading_halflife_s = settings[9], player->ways.rate = settings[10];
     to->settle_s = settings[11], to->asset_history_s = settings[12];
+    to->varies = settings[13] != 0.0, to->n_recent = cdbm_size_from(settings[14]), to->vary_within = settings[15];
     for (i = 0; i < n_settings; i++)
-        if (!(settings[i] >= 0.0 && settings[i] <= 1e6)) cdbm_refuse(bundle, "a setting of a controller is none");
-    if (to->n_played > 1024) cdbm_refuse(bundle, "a controller is damaged");
+        if (!(settings[i] >= 0.0 && (settings[i] <= 1e6 || i == 15))) cdbm_refuse(bundle, "a setting of a controller is none");
+    if (to->n_played > 1024 || to->n_recent > CDBM_MOST_RECENT) cdbm_refuse(bundle, "a controller is damaged");
     cdbm_read_tables(bundle, player);
     if (player->has_poses && !bundle->why) cdbm_read_output(bundle, number, player);
     to->databases = player->clips;
@@ -316,16 +318,21 @@ static inline void cdbm_begin(const cdbm_player *player, double *state, double x
     if (player->has_poses) cdbo_poses_begin(&player->poses, cdbm_pose_part(player, state));
 }
 
+/* Let chance go by another seed than 0, where what plays varies: equal seeds vary equally. */
+static inline void cdbm_seed(const cdbm_player *player, double *state, uint64_t seed)
+{
+    cdbm_state *played = (cdbm_state *)(void *)cdbm_played_part(player, state);
+    played->seed = (double)(seed & 0x1FFFFFFFFFFFFF), played->n_drawn = 0.0;
+}
+
 /* Whether a block may be a character of this player: to be asked of one that comes from elsewhere. */
 static inline int cdbm_is_state(const cdbm_player *player, const double *state)
 {
     double *own = (double *)(uintptr_t)state;
     const cdbm_walk *walk = (const cdbm_walk *)(const void *)state;
-    const cdbm_state *played = (const cdbm_state *)(const void *)cdbm_played_part(player, own);
     const cdbo_instant *displayed = cdbm_displayed(player, own);
     if (!(walk->n_trail >= 0.0 && walk->n_trail <= (double)player->ways.n_trail)) return 0;
-    if (!(played->n_played >= 0.0 && played->n_played <= (double)player->controller.n_played)) return 0;
-    if (!cdbm_is_playing(&player->controller, &played->playing)) return 0;
+    if (!cdbm_is_row(&player->controller, cdbm_played_part(player, own))) return 0;
     return !player->has_poses || displayed->bank < 0.0 || cdbo_is_moment(&player->poses, displayed->bank, displayed->range);
 }
 
@@ -665,7 +672,7 @@ static inline int cdbm_decide_for_event(const cdbm_player *player, const cdbm_in
     cdbm_ask(controller, &own, i, before + i * width, moved, after + i * width, &many->decisions[i], numbers);
     is_done = cdbm_choose(controller, &own, i, i + 1, after, many->moved, many->decisions, many->found, room);
     if (is_done != 1) return is_done;
-    cdbm_compare(controller, &own, i, moved, &many->decisions[i], numbers);
+    if (!cdbm_weigh(controller, &own, i, after + i * width, moved, &many->decisions[i], numbers, room)) return 0;
     cdbm_decide(controller, &own, i, before + i * width, moved, after + i * width, &many->decisions[i]);
     return 1;
 }
@@ -746,7 +753,8 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
         cdbm_room rest = left;
         if (inputs[i].is_copy && inputs[i].event && !cdbm_give_event(player, &inputs[i], many.play_of + i * player->n_ranges, &own, &rest)) return 0;
         if (inputs[i].is_copy) own.plays = &many.followed[i].play, own.flags = NULL;
-        else if (!inputs[i].event) cdbm_compare(controller, &given, i, &many.moved[i], &many.decisions[i], numbers);
+        else if (!inputs[i].event && !cdbm_weigh(controller, &given, i, after + i * played, &many.moved[i], &many.decisions[i], numbers, left))
+            return 0;
         if (!cdbm_seeks_event(&inputs[i]))
             cdbm_decide(controller, &own, i, before + i * played, &many.moved[i], after + i * played, &many.decisions[i]);
         memcpy(cdbm_played_part(player, many.states + i * width), after + i * played, played * sizeof(double));

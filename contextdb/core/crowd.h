@@ -5,6 +5,7 @@
  *   cdbm_crowd_size      how many there are of something
  *   cdbm_crowd_table, cdbm_crowd_live   a table of the bundle, and a character's facts for it: set them by cdb_set_number and the others
  *   cdbm_place_one, cdbm_steer_one      put one somewhere, with nothing played yet; and what its stick asks for
+ *   cdbm_seed_one        let chance decide otherwise for one
  *   cdbm_event_one       what is to happen, and in how many seconds
  *   cdbm_restore_one     put one where it stood
  *   cdbm_enter_one       play a one-off that a match node chooses for a target
@@ -145,6 +146,14 @@ CDB_API int cdbm_place_one(cdbm_crowd *crowd, size_t i, double x, double z, doub
     if (i >= crowd->n) return 0;
     cdbm_begin(&crowd->player, crowd->states + i * cdbm_state_width(&crowd->player), x, z, heading);
     crowd->inputs[i].one_off = NULL;
+    return 1;
+}
+
+/* Let chance go by another seed than 0 for a character that was put in its place, see cdbm_seed. 0 where there is none of that number. */
+CDB_API int cdbm_seed_one(cdbm_crowd *crowd, size_t i, uint64_t seed)
+{
+    if (i >= crowd->n) return 0;
+    cdbm_seed(&crowd->player, crowd->states + i * cdbm_state_width(&crowd->player), seed);
     return 1;
 }
 

@@ -153,6 +153,7 @@ def drawn(rng, is_captured):
     settings = motion.ControllerSettings(
         search_every_s=rng.choice([0.0, 0.1, 0.3]), history_s=rng.choice([0.0, 0.5]), until_natural=rng.random() < 0.3,
         grace_s=rng.choice([0.0, 0.3]), asset_history_s=rng.choice([0.0, 1.5]),
+        variation=rng.choice([None, motion.Variation(0.3, 0), motion.Variation(1.0, 2)]),
     )  # fmt: skip
     output = motion.PoseSettings(root=root, foot_lock=rng.random() < 0.7, path_alignment=rng.random() < 0.5)
     return motion.Controller(motion.Selector(entries), settings), schema, banks, output
@@ -170,6 +171,10 @@ def entered(rng, one, stick, gait, nodes):
     return None if play is None else motion.OneOff(one, play, name), given
 
 
+def seeded(controller, seed):
+    return motion.Controller(controller.selector, controller.settings, rng=seed)
+
+
 def session(rng, n_ticks, is_captured=False):
     """A bundle, what characters are given in it, and what Python makes of that."""
     controller, schema, banks, output = drawn(rng, is_captured)
@@ -177,13 +182,15 @@ def session(rng, n_ticks, is_captured=False):
     nodes = {name: motion.MatchNode(databases[name], position_weight=weights[0], rotation_weight=weights[1]) for name in databases}
     played = Played(controller, schema, banks, output, {name: node.ends for name, node in nodes.items()})
     banks = moving_alike(banks)
+    n = rng.randint(1, 4)
+    seeds = [rng.randrange(1 << rng.choice([1, 53])) for _ in range(n)]
     bundle = bundle_of({"player": played}, {"turns": "moves", "all": "moves"}, {"moves": file_of("moves", table(is_captured))})
-    n, ground = rng.randint(1, 4), rng.choice([None, slope])
+    ground = rng.choice([None, slope])
     members = [
-        motion.Character(controller.copy(), schema, table(is_captured), motion.PoseStream(banks, output), ground=ground)
-        for _ in range(n)
+        motion.Character(seeded(controller, seed), schema, table(is_captured), motion.PoseStream(banks, output), ground=ground)
+        for seed in seeds
     ]
-    crowd, given, expected = motion.Crowd(members), [struct.pack("qq", n, n_ticks)], []
+    crowd, given, expected = motion.Crowd(members), [struct.pack("qq", n, n_ticks), struct.pack(f"{n}q", *seeds)], []
     sticks, facings, events, once = [(0.0, 0.0)] * n, [math.nan] * n, [None] * n, [None] * n
     n_events = 2 if is_captured else 3
     for tick in range(n_ticks):

@@ -23,8 +23,9 @@ from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.events import events_of
+from contextdb.motion.selection.variation import asset_keys
 
-MAGIC = b"CDBMOTN1"
+MAGIC = b"CDBMOTN2"
 DATABASE, BANK, CONTROLLER, TABLE = 1, 40, 60, 90
 """The first kinds of the parts of each."""
 OUTPUT = (
@@ -125,8 +126,6 @@ def _check(players: Mapping[str, Played]) -> None:
     faults = []
     for name, player in players.items():
         chooser, place = player.controller.chooser, Place(f"[controllers.{name}]")
-        if player.controller.settings.variation is not None:
-            faults.append(Fault("a bundle has no random choice among near ties.", "no variation_within", place=place))
         faults += [
             Fault(f"the database {in_quotes(missing)} is not loaded.", "databases that are there", place=place)
             for missing, database in zip(chooser.names, chooser.databases, strict=True)
@@ -141,7 +140,7 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
     at = chooser.names.index(name)
     database = chooser.databases[at]
     assert database is not None, "it was checked"
-    _, starts, stops, same, looping, root, marks, weights, rate, _, _, *rest = chooser.part(
+    _, starts, stops, same, _, looping, root, marks, weights, rate, _, _, *rest = chooser.part(
         chooser.selector.entries[at], database, chooser.rates[at]
     )
     *arrays, kinds, n_frames, n_kinds, offset, scale, channels, channel_weights, roots = database.frame_parts
@@ -152,11 +151,11 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
         row_starts, row_numbers, mirrored, _ = chooser.rows_of(name, table.assets)
         rows = mirrored, row_starts, row_numbers
     measures = kinds, offset, scale, channels, channel_weights, roots
-    nodes = (database.marks.warps, player.ends[name]) if name in player.ends else ()
+    nodes = (database.marks.warps, player.ends[name]) if name in player.ends else (None, None)
     played = starts, stops, same, looping, root, marks, weights, own
     texts = _texts(database.assets), *rows, _texts([name])
-    levels, events = _levels(database), _events(database)
-    bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, *texts, *levels, *events, *nodes])
+    levels, events, keys = _levels(database), _events(database), asset_keys(database.assets)
+    bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, *texts, *levels, *events, *nodes, keys])
     if bank is not None:
         *frames, bank_rate = bank.frame_parts(bank.steps)
         bundle.add(BANK, number, [*frames, np.array([bank_rate])])
@@ -164,7 +163,7 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
 
 def _controller(name: str, player: Played, entries: list[tuple[int, int, int]], banks: list[PoseBank]) -> list[Part]:
     chooser, body = player.controller.chooser, Steered()
-    settings, shared = chooser.settings, chooser.shared(None, None)
+    settings, shared, varies = chooser.settings, chooser.shared(None, None), chooser.settings.variation
     biases = chooser.ranges(None, 1)[1][0]
     thresholds = np.array([np.nan if each.threshold is None else each.threshold for each in chooser.selector.entries], np.float64)
     bars = np.array([settings.bar_of(each) for each in chooser.databases if each is not None], np.float64)
@@ -172,7 +171,8 @@ def _controller(name: str, player: Played, entries: list[tuple[int, int, int]], 
         [
             chooser.n_played, settings.search_every_s, settings.jump_threshold_s, settings.history_s, settings.min_play_rate,
             settings.max_play_rate, settings.grace_s, settings.until_natural, player.banks is not None, body.velocity_halflife_s,
-            player.schema.rate, settings.settle_s, settings.asset_history_s,
+            player.schema.rate, settings.settle_s, settings.asset_history_s, varies is not None, chooser.n_recent,
+            0.0 if varies is None else varies.within,
         ],
         np.float64,
     )  # fmt: skip

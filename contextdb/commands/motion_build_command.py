@@ -36,6 +36,7 @@ from contextdb.disk.engines import Engines
 from contextdb.errors import ContextDBError, Fault, FileError, MotionError, Place, in_quotes, plural, some
 from contextdb.files.tensors import other_layout
 from contextdb.motion.characters.facts import FACTS, is_asked
+from contextdb.motion.characters.played import of_played
 from contextdb.motion.clips.doubts import grouped
 from contextdb.motion.nodes.match_node import MatchNode
 from contextdb.motion.search.database import MotionDatabase
@@ -294,7 +295,9 @@ def file_of(name: str, table: CompiledTable) -> TableFile:
         table.save(file)
         octets = file.read_bytes()
     conditions = table.asked
-    own = {each: each[0] for each, of in FACTS.items() if each in conditions and is_asked(each, of, conditions[each])}
+    played = {each: of_played(each, condition) for each, condition in conditions.items()}
+    own = {each: fact.letter for each, fact in played.items() if fact is not None}
+    own |= {each: each[0] for each, of in FACTS.items() if each in conditions and is_asked(each, of, conditions[each])}
     changed = {each.name: _mirror_text(name, each) for each in changed_in_mirror(conditions.values()).values()}
     return TableFile(octets, table.leaves, own, changed)
 

@@ -11,7 +11,7 @@
  * works in room that it is given, which only one call uses at a time.
  *
  * A game gives the facts of each table, or its valid rows. A fact that is missing and that the character knows itself (its speed, the
- * direction of its stick, its turn) it adds. */
+ * direction of its stick, its turn, and those of what plays) it adds. */
 
 #define CDBM_MOST_DATABASES 64
 #define CDBM_MOST_TABLES 16
@@ -382,15 +382,54 @@ static inline const char *cdbm_said_of(const cdbm_player *player, uint32_t kind,
     return NULL;
 }
 
-/* A fact that a game does not give and that the character knows itself. */
-static inline void cdbm_add_own(const cdbm_player *player, size_t table, size_t at, const cdbm_walk *walk, const cdbo_goal *goal, cdb_fact *fact)
+/* Whether the frame that plays has a tag of that number in the bundle, or one below it. */
+static inline int cdbm_has_tag(const cdbm_player *player, size_t database, int64_t frame, const char *number)
+{
+    const cdbm_clips *clips = &player->clips[database];
+    size_t n, tag = 0, kind = (size_t)(clips->frames->kinds ? clips->frames->kinds[frame] : 0);
+    const uint8_t *tags = (const uint8_t *)cdbm_find(&player->bundle, CDBM_P_TAGS, (size_t)player->database_of[database], 1, &n);
+    for (; *number >= '0' && *number <= '9' && tag < 1 << 20; number++) tag = 10 * tag + (size_t)(*number - '0');
+    return tags && tag * clips->n_kinds + kind < n && tags[tag * clips->n_kinds + kind];
+}
+
+/* A fact of what plays, by the letter that a bundle has for it, see contextdb/motion/characters/played.py. */
+static inline double cdbm_fact_of(const cdbm_player *player, const cdbm_playing *playing, char letter, const char *more)
+{
+    int is_until = letter == 'L' || letter == 'R', is_foot = is_until || letter == 'l' || letter == 'r';
+    const cdbm_clips *clips;
+    size_t database, range, n;
+    double speed, turn, until_s = CDBM_MOST_UNTIL_S;
+    if (playing->database < 0.0) return is_until ? until_s : 0.0;
+    database = (size_t)playing->database, range = (size_t)playing->range, clips = &player->clips[database];
+    n = (size_t)(clips->stops[range] - clips->starts[range]);
+    if (is_foot && player->has_poses) {
+        const cdbo_frames *bank = player->bank_list[player->bank_of[database]];
+        size_t own = (size_t)player->pose_ranges[database][range];
+        until_s = cdbm_until_down_s(bank->contacts + (size_t)bank->starts[own] * bank->n_feet, (size_t)bank->n_steps[own] + 1, bank->n_feet,
+            letter == 'R' || letter == 'r', bank->looping[own], bank->rate, playing->at_s);
+    }
+    if (is_foot) return is_until ? until_s : until_s == 0.0;
+    if (letter == 'g') return cdbm_has_tag(player, database, (int64_t)playing->frame, more);
+    if (letter == 'p') return cdbm_phase(n, clips->rate, playing->at_s);
+    if (!clips->root) return 0.0;
+    cdbm_going(clips->root + 3 * clips->starts[range], n, clips->rate, playing->at_s, &speed, &turn);
+    return letter == 'v' ? speed : turn;
+}
+
+/* A fact that a game does not give and that the character knows itself: of its body, or of what plays until now. */
+static inline void cdbm_add_own(const cdbm_player *player, size_t table, size_t at, const double *state, const cdbo_goal *goal, cdb_fact *fact)
 {
     const cdb_condition *condition = &player->opened[table]->schema.conditions[at];
+    const cdbm_state *played = (const cdbm_state *)(const void *)cdbm_played_part(player, (double *)(uintptr_t)state);
+    const char *more;
     char letter = 0;
+    double number;
     if (condition->expr || !cdbi_is_missing(condition, fact)) return;
-    if (!cdbi_is_double(condition->type)) return;
-    if (!cdbm_said_of(player, CDBM_P_OWN_FACTS, table, condition->name, &letter)) return;
-    fact->number = cdbm_own_fact(walk, goal, letter);
+    if (!(more = cdbm_said_of(player, CDBM_P_OWN_FACTS, table, condition->name, &letter))) return;
+    if (letter == 's' || letter == 'd' || letter == 't') number = cdbm_own_fact((const cdbm_walk *)(const void *)state, goal, letter);
+    else number = cdbm_fact_of(player, &played->playing, letter, more);
+    if (cdbi_is_double(condition->type)) fact->number = number;
+    else if (condition->type == CDB_BOOL) fact->whole = number != 0.0;
 }
 
 /* The facts as a mirror shows them; whether any is another. */
@@ -426,7 +465,7 @@ typedef struct cdbm_answer {        /* of a table, as it is and with mirrored fa
 } cdbm_answer;
 
 /* Ask a table. 1; -2 for a fact that is refused. */
-static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const cdbm_input *input, const cdbm_walk *walk,
+static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const cdbm_input *input, const double *state,
     cdbm_answer *answer, cdbm_room *room)
 {
     const cdb_any *any = player->opened[table];
@@ -435,7 +474,7 @@ static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const 
     size_t n_words = any->table.n_words, n_rows = any->table.n_rows, i, side;
     for (i = 0; i < schema->n_conditions; i++) {
         own[i] = input->facts && input->facts[table] ? input->facts[table][i] : cdbi_missing(&schema->conditions[i]);
-        cdbm_add_own(player, table, i, walk, &input->goal, &own[i]);
+        cdbm_add_own(player, table, i, state, &input->goal, &own[i]);
     }
     for (side = 0; side < 2; side++) {
         uint64_t *mask = (uint64_t *)cdbm_part(room, n_words * sizeof(uint64_t));
@@ -472,7 +511,7 @@ static inline int cdbm_let_play(const cdbm_player *player, const cdbm_input *inp
                 answer.masks[1] = input->mirrored && input->mirrored[table] ? input->mirrored[table] : answer.masks[0];
                 if (!answer.masks[0]) continue;
             } else if (!answer.masks[0]) {
-                int is_done = cdbm_ask_table(player, table, input, (const cdbm_walk *)(const void *)state, &answer, &left);
+                int is_done = cdbm_ask_table(player, table, input, state, &answer, &left);
                 if (is_done != 1) return is_done;
             }
             cdbm_fill_ranges(&player->tables[i], answer.masks, answer.costs[0] ? answer.costs : NULL, player->range_biases, ranges, biases,

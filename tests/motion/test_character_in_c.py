@@ -23,7 +23,7 @@ from contextdb import motion
 from contextdb.commands.compile_command import c_motion_header
 from contextdb.commands.motion_build_command import file_of
 from contextdb.compiled.c_header import c_header_of
-from contextdb.core import direction_of
+from contextdb.motion.characters.facts import Moment
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.output.bank import moving_alike
 from contextdb.motion.selection.chooser import N_DECISION
@@ -67,10 +67,24 @@ MARKS = Markup.parse(
 CAPTURED_GAITS = [{"run": "Run", "dash": "Run"}.get(name.split("_")[0], "Idle Walk") for name in CAPTURED]
 CAPTURED_COLUMNS = {"Asset Name": list(CAPTURED), "gait": CAPTURED_GAITS, "direction": ["Any"] * len(CAPTURED)}
 CONDITIONS = {"gait": {"type": "enum", "values": ["Idle", "Walk", "Run"]}, "direction": {"type": "angle"}}
+OF_PLAYED = {
+    "LeftFoot.Down": {"type": "bool"},
+    "RightFoot.UntilDown_s": {"type": "number", "unit": "s"},
+    "Playing.Speed": {"type": "number", "unit": "m/s"},
+    "Playing.Turn": {"type": "number"},
+    "Playing.Phase": {"type": "number"},
+    "Playing.Tag.hit": {"type": "bool"},
+}
 COLUMNS = {
     "Asset Name": list(NAMES),
     "gait": ["Idle", "Walk", "Walk", "Run", "Walk", "Idle Walk"],
     "direction": ["Any", "-70..70", "20..180", "Any", "Any", "Any"],
+    "LeftFoot.Down": ["Any", "Any", "False ~0.4", "True ~0.3", "Any", "Any"],
+    "RightFoot.UntilDown_s": ["Any", "<0.2 ~0.5", "Any", "Any", ">=0.1 ~0.2", "Any"],
+    "Playing.Speed": ["Any", "1..9 ~0.3/2", "Any", "<2.5 ~0.1/1", "Any", "Any"],
+    "Playing.Turn": ["-5..5 ~0.2/20", "Any", "Any", "Any", "Any", "-20..20 ~0.1/9"],
+    "Playing.Phase": ["Any", "Any", ">0.3 ~0.3/2", "Any", "<0.8", "Any"],
+    "Playing.Tag.hit": ["Any", "Any", "Any", "Any", "Any", "False"],
     "play_rate": ["", "0.9..1.2", "", "", "1.1", "1.3..1.5"],
     "start_s": ["", "", "0.4", "", "", ""],
     "blend_s": ["", "", "", "0.2", "", "0.1"],
@@ -84,7 +98,7 @@ def table(is_captured=False):
     return (
         cdb.Table.from_columns(CAPTURED_COLUMNS, CONDITIONS)
         if is_captured
-        else cdb.Table.from_columns(COLUMNS, CONDITIONS, {"outputs": OUTPUTS})
+        else cdb.Table.from_columns(COLUMNS, {**CONDITIONS, **OF_PLAYED}, {"outputs": OUTPUTS})
     ).compile()
 
 
@@ -164,7 +178,8 @@ def entered(rng, one, stick, gait, nodes):
     name = rng.choice(list(nodes))
     node, turn = nodes[name], rng.choice([None, rng.uniform(-4.0, 4.0)])
     target = motion.Target(rng.uniform(-2.0, 2.0), rng.uniform(-1.0, 4.0), turn)
-    facts = {"gait": gait, "direction": direction_of(*stick, one.body.heading)}
+    moment = Moment(0.0, stick, None, one.body, one.playing, one._played())
+    facts = {"gait": gait} | {fact: of(moment) for fact, of in one.asked_facts.items()}
     play = node.enter(one.features(), target, one.tables.query(facts))
     weights = node.position_weight, node.rotation_weight
     given = list(nodes).index(name), target.left_m, target.ahead_m, math.nan if turn is None else turn, *weights

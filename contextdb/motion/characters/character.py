@@ -125,6 +125,8 @@ class Character:
         self.controller, self.schema, self.stream, self.pose = controller, schema, stream, pose
         self.own_facts, self.unknown, self.ground = dict(own_facts), unknown, ground
         self.tables = tables
+        self._is_posed = True
+        """Whether updates make poses; a one-off makes its own."""
         self._own = OwnFacts.of(None, {})
         self._body: Steered | None = None
         self._stand(walks.begun(schema.ways, body), body)
@@ -424,7 +426,7 @@ class Character:
     def _answer(self, step: Step, decided: Decided, before: ControllerPlace) -> Updated:
         """The pose after a decision; `before` is where the controller stood."""
         on, ways, poses, roots, moves_body = step.on, self.schema.ways, None, step.on.places, STAYS
-        if self.stream is not None:
+        if self.stream is not None and self._is_posed:
             try:
                 poses, moves_body = self.stream.posed(decided, step.dt_s, on.places, self.ground)
             except Exception:

@@ -26,7 +26,7 @@ from contextdb.motion.selection.events import events_of
 from contextdb.motion.selection.variation import asset_keys
 
 MAGIC = b"CDBMOTN2"
-DATABASE, BANK, CONTROLLER, TABLE = 1, 40, 60, 90
+DATABASE, BANK, CONTROLLER, TABLE = 1, 44, 60, 90
 """The first kinds of the parts of each."""
 OUTPUT = (
     "blend", "halflife_s", "root", "position_weight", "rotation_weight", "position_pull_s", "rotation_pull_s",
@@ -34,6 +34,7 @@ OUTPUT = (
     "max_stride", "foot_lock", "foot_halflife_s", "foot_radius_m",
 )  # fmt: skip
 """The settings of poses in the order of the core, see pose.h."""
+TAG = "g="
 Part = NDArray[Any] | bytes | None
 
 
@@ -59,14 +60,20 @@ class TableFile:
     assets: Sequence[str]
     """Those of its rows."""
     own_facts: Mapping[str, str] = field(default_factory=dict)
-    """The facts that a character adds: "s" its speed, "d" the direction of its stick, "t" its turn."""
+    """The facts that a character adds: "s" its speed, "d" the direction of its stick, "t" its turn, the letters of `FACTS` of what
+    plays (characters/played.py), and "g=TAG" for a tag of its frame."""
     mirror: Mapping[str, str] = field(default_factory=dict)
     """How facts change in a mirror: "n" negated, "p=NAME" that of another condition, "v=1 0" enum values by their numbers."""
 
     @property
-    def parts(self) -> list[bytes]:
-        """What a bundle says of facts."""
-        own = [f"{letter}{name}" for name, letter in self.own_facts.items()]
+    def tags(self) -> list[str]:
+        """The tags that it asks for."""
+        return [text[2:] for text in self.own_facts.values() if text.startswith(TAG)]
+
+    def parts(self, tags: Sequence[str]) -> list[bytes]:
+        """What a bundle with these tags says of facts."""
+        numbers = {f"{TAG}{tag}": f"={number}" for number, tag in enumerate(tags)}
+        own = [f"{text[0]}{name}{numbers.get(text, '')}" for name, text in self.own_facts.items()]
         mirrored = [f"{text[0]}{name}{text[1:]}" for name, text in self.mirror.items()]
         return [_texts(own), _texts(mirrored)]
 
@@ -106,15 +113,17 @@ def bundle_of(players: Mapping[str, Played], table_of: Mapping[str, str], tables
     """
     _check(players)
     bundle, numbers, names = Bundle(), {name: i for i, name in enumerate(tables)}, list[str]()
+    tags = list(dict.fromkeys(tag for table in tables.values() for tag in table.tags))
     banks = moving_alike({name: bank for player in players.values() for name, bank in (player.banks or {}).items()})
     for number, (name, table) in enumerate(tables.items()):
-        bundle.add(TABLE, number, [table.octets, _texts([name]), *table.parts])
+        bundle.add(TABLE, number, [table.octets, _texts([name]), *table.parts(tags)])
     for number, (name, player) in enumerate(players.items()):
         entries = []
         for database in player.controller.chooser.names:
             if database not in names:
                 names.append(database)
-                _add_database(bundle, len(names) - 1, player, database, banks.get(database), tables.get(table_of.get(database, "")))
+                own_table = tables.get(table_of.get(database, ""))
+                _add_database(bundle, len(names) - 1, player, database, banks.get(database), own_table, tags)
             at, has_bank = names.index(database), player.banks is not None and database in player.banks
             entries.append((at, at if has_bank else -1, numbers.get(table_of.get(database, ""), -1)))
         own = [banks[each] for each in player.controller.chooser.names if player.banks is not None and each in player.banks]
@@ -135,7 +144,9 @@ def _check(players: Mapping[str, Played]) -> None:
         raise MotionError(*faults)
 
 
-def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: PoseBank | None, table: TableFile | None) -> None:
+def _add_database(
+    bundle: Bundle, number: int, player: Played, name: str, bank: PoseBank | None, table: TableFile | None, tags: Sequence[str]
+) -> None:
     chooser = player.controller.chooser
     at = chooser.names.index(name)
     database = chooser.databases[at]
@@ -154,8 +165,9 @@ def _add_database(bundle: Bundle, number: int, player: Played, name: str, bank: 
     nodes = (database.marks.warps, player.ends[name]) if name in player.ends else (None, None)
     played = starts, stops, same, looping, root, marks, weights, own
     texts = _texts(database.assets), *rows, _texts([name])
-    levels, events, keys = _levels(database), _events(database), asset_keys(database.assets)
-    bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, *texts, *levels, *events, *nodes, keys])
+    levels, events = _levels(database), _events(database)
+    more = asset_keys(database.assets), b"".join(database.marks.kinds_with(tag).tobytes() for tag in tags)
+    bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, *texts, *levels, *events, *nodes, *more])
     if bank is not None:
         *frames, bank_rate = bank.frame_parts(bank.steps)
         bundle.add(BANK, number, [*frames, np.array([bank_rate])])

@@ -295,7 +295,7 @@ static inline size_t cdbm_room_size(const cdbm_player *player, size_t n)
     size_t each = cdbm_rounded(cdbm_state_size(player)) + cdbm_rounded(n_features * sizeof(double)) + cdbm_rounded(sizeof(cdbm_moved))
         + cdbm_rounded(player->n_ranges) + 2 * cdbm_rounded(player->n_ranges * sizeof(double)) + 2 * cdbm_rounded(cdbm_width(&player->controller) * sizeof(double)) + 64
         + cdbm_rounded(player->controller.n_databases * (sizeof(cdbm_found) + 1)) + cdbm_rounded(sizeof(cdbm_decision))
-        + cdbm_rounded(sizeof(cdbm_followed));
+        + cdbm_rounded(sizeof(cdbm_followed)) + cdbm_rounded(sizeof(double));
     return n * each + cdbm_rounded((4 * n_frames + 3 * n_features) * sizeof(double)) + cdbm_choice_room(&player->controller, n)
         + cdbm_rounded(player->n_frames * sizeof(double)) + cdbm_rounded(player->n_frames)
         + cdbm_rounded((player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double)) + cdbm_answer_room(player)
@@ -346,6 +346,7 @@ typedef struct cdbm_many {          /* a crowd in an update, in room */
     cdbm_decision *decisions;
     cdbm_followed *followed;
     uint8_t *ranges, *among, *urgent;
+    double *wide;
 } cdbm_many;
 
 static inline int cdbm_take_many(const cdbm_player *player, size_t n, cdbm_many *many, cdbm_room *room)
@@ -358,7 +359,8 @@ static inline int cdbm_take_many(const cdbm_player *player, size_t n, cdbm_many 
     many->ranges = (uint8_t *)cdbm_part(room, n * player->n_ranges), many->urgent = (uint8_t *)cdbm_part(room, n);
     many->biases = (double *)cdbm_part(room, n * player->n_ranges * sizeof(double));
     many->play_of = (int64_t *)cdbm_part(room, n * player->n_ranges * sizeof(int64_t));
-    if (!many->biases || !many->play_of) return 0;
+    many->wide = (double *)cdbm_part(room, n * sizeof *many->wide);
+    if (!many->biases || !many->play_of || !many->wide) return 0;
     many->among = (uint8_t *)cdbm_part(room, n * player->controller.n_databases);
     many->followed = (cdbm_followed *)cdbm_part(room, n * sizeof *many->followed);
     return many->followed && many->states && many->queries && many->moved && many->found && many->decisions && many->ranges && many->urgent && many->among;
@@ -464,8 +466,9 @@ typedef struct cdbm_answer {        /* of a table, as it is and with mirrored fa
     const double *costs[2];
 } cdbm_answer;
 
-/* Ask a table. 1; -2 for a fact that is refused. */
-static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const cdbm_input *input, const double *state,
+/* Ask a table; for what plays already, where `is_wide`, with cells that are widened. 1; 0 with too little room; -2 for a fact that is
+ * refused. */
+static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const cdbm_input *input, const double *state, int is_wide,
     cdbm_answer *answer, cdbm_room *room)
 {
     const cdb_any *any = player->opened[table];
@@ -485,8 +488,10 @@ static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const 
         }
         if (side == 1) facts = mirrored;
         if (!mask || (any->table.soft && !costs)) return 0;
-        if (cdb_query(&any->table, any->columns, schema, facts, input->unknown, mask, n_words, input->fault) != CDB_OK) return -2;
-        if (costs && cdb_penalties(&any->table, any->columns, schema, facts, input->unknown, costs, n_rows, input->fault) != CDB_OK) return -2;
+        if ((is_wide ? cdb_query_widened : cdb_query)(&any->table, any->columns, schema, facts, input->unknown, mask, n_words, input->fault) != CDB_OK)
+            return -2;
+        if (costs && (is_wide ? cdb_penalties_widened : cdb_penalties)(&any->table, any->columns, schema, facts, input->unknown, costs, n_rows,
+                input->fault) != CDB_OK) return -2;
         answer->masks[side] = mask, answer->costs[side] = costs;
     }
     return 1;
@@ -511,7 +516,7 @@ static inline int cdbm_let_play(const cdbm_player *player, const cdbm_input *inp
                 answer.masks[1] = input->mirrored && input->mirrored[table] ? input->mirrored[table] : answer.masks[0];
                 if (!answer.masks[0]) continue;
             } else if (!answer.masks[0]) {
-                int is_done = cdbm_ask_table(player, table, input, state, &answer, &left);
+                int is_done = cdbm_ask_table(player, table, input, state, 0, &answer, &left);
                 if (is_done != 1) return is_done;
             }
             cdbm_fill_ranges(&player->tables[i], answer.masks, answer.costs[0] ? answer.costs : NULL, player->range_biases, ranges, biases,
@@ -521,6 +526,39 @@ static inline int cdbm_let_play(const cdbm_player *player, const cdbm_input *inp
                     if (play_of[r] >= 0) play_of[r] += player->plays_at[table];
         }
     }
+    return 1;
+}
+
+/* Whether a condition of a table has a hysteresis. */
+static inline int cdbm_is_widening(const cdb_any *any)
+{
+    size_t i;
+    for (i = 0; i < any->schema.n_conditions; i++)
+        if (any->columns[i].hysteresis > 0.0) return 1;
+    return 0;
+}
+
+/* Write the bias of what would play on where its table, widened, lets that play and else does not; NAN otherwise. As cdbm_let_play. */
+static inline int cdbm_let_play_on(const cdbm_player *player, const cdbm_input *input, const double *state, const cdbm_moved *moved,
+    const uint8_t *ranges, double *wide, cdbm_room room)
+{
+    size_t database = (size_t)moved->to.database, range = (size_t)moved->to.range, at;
+    cdbm_answer answer = {{NULL, NULL}, {NULL, NULL}};
+    cdbm_table_ranges one;
+    uint8_t is_valid = 0;
+    double bias;
+    int is_done;
+    *wide = NAN;
+    if (moved->to.database < 0.0 || input->rows || player->table_of[database] < 0) return 1;
+    at = player->clips[database].range_at + range;
+    if (ranges[at] || !cdbm_is_widening(player->opened[player->table_of[database]])) return 1;
+    is_done = cdbm_ask_table(player, (size_t)player->table_of[database], input, state, 1, &answer, &room);
+    if (is_done != 1) return is_done;
+    one = player->tables[database];
+    one.n_ranges = 1, one.at = 0, one.starts += range, one.mirrored += range;
+    bias = player->range_biases[at];
+    cdbm_fill_ranges(&one, answer.masks, answer.costs[0] ? answer.costs : NULL, player->range_biases + at, &is_valid, &bias, NULL);
+    if (is_valid) *wide = bias;
     return 1;
 }
 
@@ -742,7 +780,7 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
     cdbm_given given;
     cdbm_many many;
     cdbm_room left;
-    int is_done = 1;
+    int is_done = 1, is_any_wide = 0;
     if (!(dt_s >= 0.0 && dt_s <= 1e6) || !cdbm_take_many(player, n, &many, &room)) return dt_s >= 0.0 && dt_s <= 1e6 ? 0 : -1;
     memset(&given, 0, sizeof given);
     memset(many.among, 1, n * controller->n_databases);
@@ -760,13 +798,18 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
             if ((is_done = cdbm_bring(player, states + i * width, dt_s, input.one_off, &body, room)) != 1) return is_done;
             input.body = &body;
         }
+        many.wide[i] = NAN;
         many.urgent[i] = (uint8_t)((inputs[i].force ? CDBM_FORCE : 0) | (inputs[i].interrupt ? CDBM_INTERRUPT : 0));
         if (!cdbm_query_of(player, &input, dt_s, states + i * width, many.states + i * width, &many.moved[i],
                 many.queries + i * n_features, room)) return 0;
         is_done = inputs[i].is_copy ? cdbm_let_follow(player, &inputs[i], &many, i) : cdbm_let_play(player, &inputs[i], many.states + i * width, many.ranges + i * player->n_ranges,
             many.biases + i * player->n_ranges, many.play_of + i * player->n_ranges, room);
+        if (is_done == 1 && !inputs[i].is_copy)
+            is_done = cdbm_let_play_on(player, &inputs[i], many.states + i * width, &many.moved[i], many.ranges + i * player->n_ranges, &many.wide[i], room);
         if (is_done != 1) return is_done;
+        is_any_wide |= many.wide[i] == many.wide[i];
     }
+    if (is_any_wide) given.wide = many.wide;
     left = room;
     before = (double *)cdbm_part(&left, n * played * sizeof(double)), after = (double *)cdbm_part(&left, n * played * sizeof(double));
     numbers = (double *)cdbm_part(&left, n_features * sizeof(double));

@@ -66,24 +66,24 @@ MARKS = Markup.parse(
 )
 CAPTURED_GAITS = [{"run": "Run", "dash": "Run"}.get(name.split("_")[0], "Idle Walk") for name in CAPTURED]
 CAPTURED_COLUMNS = {"Asset Name": list(CAPTURED), "gait": CAPTURED_GAITS, "direction": ["Any"] * len(CAPTURED)}
-CONDITIONS = {"gait": {"type": "enum", "values": ["Idle", "Walk", "Run"]}, "direction": {"type": "angle"}}
+CONDITIONS = {"gait": {"type": "enum", "values": ["Idle", "Walk", "Run"]}, "direction": {"type": "angle", "hysteresis": 100.0}}
 OF_PLAYED = {
     "LeftFoot.Down": {"type": "bool"},
     "RightFoot.UntilDown_s": {"type": "number", "unit": "s"},
-    "Playing.Speed": {"type": "number", "unit": "m/s"},
+    "Playing.Speed": {"type": "number", "unit": "m/s", "hysteresis": 0.4},
     "Playing.Turn": {"type": "number"},
-    "Playing.Phase": {"type": "number"},
+    "Playing.Phase": {"type": "number", "hysteresis": 0.15},
     "Playing.Tag.hit": {"type": "bool"},
 }
 COLUMNS = {
     "Asset Name": list(NAMES),
     "gait": ["Idle", "Walk", "Walk", "Run", "Walk", "Idle Walk"],
-    "direction": ["Any", "-70..70", "20..180", "Any", "Any", "Any"],
+    "direction": ["Any", "-40..40", "20..180", "-40..40", "Any", "Any"],
     "LeftFoot.Down": ["Any", "Any", "False ~0.4", "True ~0.3", "Any", "Any"],
     "RightFoot.UntilDown_s": ["Any", "<0.2 ~0.5", "Any", "Any", ">=0.1 ~0.2", "Any"],
     "Playing.Speed": ["Any", "1..9 ~0.3/2", "Any", "<2.5 ~0.1/1", "Any", "Any"],
     "Playing.Turn": ["-5..5 ~0.2/20", "Any", "Any", "Any", "Any", "-20..20 ~0.1/9"],
-    "Playing.Phase": ["Any", "Any", ">0.3 ~0.3/2", "Any", "<0.8", "Any"],
+    "Playing.Phase": ["Any", "<0.6", ">0.3 ~0.3/2", "<0.6", "<0.8", "Any"],
     "Playing.Tag.hit": ["Any", "Any", "Any", "Any", "Any", "False"],
     "play_rate": ["", "0.9..1.2", "", "", "1.1", "1.3..1.5"],
     "start_s": ["", "", "0.4", "", "", ""],
@@ -261,7 +261,7 @@ def same(out, expected):
     assert at == len(out)
 
 
-@pytest.mark.parametrize("seed", range(12 if IS_FULL else 3))
+@pytest.mark.parametrize("seed", range(12) if IS_FULL else (1, 2, 4))
 def test_characters_in_c_are_those_of_python_to_the_bit(seed, programs, tmp_path: Path):
     is_captured = seed % 2 == 1 and (MOCAP / "assets.csv").is_file()
     bundle, given, expected = session(random.Random(seed), 1800 if IS_FULL else 150, is_captured)
@@ -273,7 +273,7 @@ def test_characters_in_c_are_those_of_python_to_the_bit(seed, programs, tmp_path
 
 
 def test_a_damaged_bundle_is_refused_or_plays_and_never_reads_outside(programs, tmp_path: Path):
-    bundle, *_ = session(random.Random(1), 1)
+    bundle, *_ = session(random.Random(2), 1)  # with variation
     (tmp_path / "bundle").write_bytes(bundle)
     assert all(0 < int(ran(program, tmp_path / "bundle", str(N_DAMAGED))) < N_DAMAGED for program in programs)
 

@@ -45,7 +45,7 @@ ACTION, CAUSE, HELD, STANDING, WINNER, IS_UNDER, CHOSEN, CURRENT = 2, 3, 4, 5, 1
 """Columns of a row, and of a decision."""
 NEW, WIDENED = (0.0, 2.0), 1.0
 """Actions that enter another frame, and what stands by hysteresis."""
-NO_DATABASE, GONE, GO_ON = -1, -2, -2
+NO_DATABASE, GONE = -1, -2
 MOST_PLAYED, MOST_JUMPS_PER_S = 1024, 60.0
 """So much of what was played is remembered at most, and so many jumps of each second."""
 MOST_CHOOSERS, MOST_ANSWERS = 16, 64

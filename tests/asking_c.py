@@ -167,6 +167,9 @@ class Told:
 
     penalties: tuple[int, list[float]]
     """Status and costs."""
+    widened: tuple[int, int]
+    """Status and rows for what plays already, as one integer."""
+    widened_penalties: tuple[int, list[float]]
     pick: tuple[int, int]
     """Status and row, -1 for none."""
     digest: int
@@ -229,10 +232,15 @@ def all_asked(
             at += 2 + n_words
             if memory >= 0:
                 n, status, rest = int(words[at]), int(words[at + 1]), words[at + 2 :]
-                costs, pick, why = rest[:n].view("<f8").tolist(), (int(rest[n]), int(rest[n + 1])), n + 3 + n_values
-                digest, outputs, why_not = int(rest[n + 2]) % 2**64, rest[n + 3 : why].tolist(), rest[why : why + n].tolist()
-                answers.told.append(Told((status, costs), pick, digest, outputs, why_not))
-                at += 5 + 2 * n + n_values
+                costs, rest = rest[:n].view("<f8").tolist(), rest[n:]
+                widened = int(rest[0]), int.from_bytes(rest[1 : 1 + n_words].tobytes(), "little")
+                wide_status, rest = int(rest[1 + n_words]), rest[2 + n_words :]
+                wide_costs, rest = rest[:n].view("<f8").tolist(), rest[n:]
+                pick, why = (int(rest[0]), int(rest[1])), 3 + n_values
+                digest, outputs, why_not = int(rest[2]) % 2**64, rest[3:why].tolist(), rest[why : why + n].tolist()
+                wide = widened, (wide_status, wide_costs)
+                answers.told.append(Told((status, costs), *wide, pick, digest, outputs, why_not))
+                at += 7 + n_words + 3 * n + n_values
         found.append(answers)
     assert at == len(words)
     return found

@@ -1,8 +1,10 @@
 """The C header says what soft cells cost, why a row is not valid, which rows an asset has, and picks as Python does."""
 
+import math
 import random
 from pathlib import Path
 
+import asking_c
 import pytest
 from asking_c import (
     CELLS,
@@ -19,10 +21,13 @@ from asking_c import (
     ask_program,
     output_words,
     random_moment,
+    random_nest,
+    random_table,
 )
 from test_c_rules import moments_of, output_cells, ruled_table
 
 from contextdb.compiled.c_header.naming import conditions_of
+from contextdb.compiled.classes import WideMasks
 from contextdb.compiled.table import CompiledTable, data_of
 from contextdb.errors import ContextError, PolicyError
 from contextdb.schema.settings import TableSettings
@@ -89,6 +94,52 @@ def test_costs_of_soft_cells_and_failing_cells_are_those_of_python(ask: Path, tm
         moments = moments_of(rng, 12)
         [answers] = all_asked(ask, tmp_path, conditions_of(data_of(compiled)), [artefact(compiled, tmp_path)], moments, memory=1)
         assert_told(compiled, answers, moments)
+
+
+REACHES = {
+    "n": (0.0, 1.0, 3.0),
+    "speed": (0.0, 0.5, 3.0, 1e300),
+    "heading": (0.0, 1.0, 20.0, math.nextafter(180.0, 0.0), 180.0, 200.0),
+}
+GROWING = {"n": ["2..3 ~1/2"], "speed": ["1..3 ~2/4", "5.. ~1.5/3"], "heading": ["0..90 ~1.5/30", "170, 20 ~2/7"]}
+
+
+def test_rows_of_what_plays_and_their_costs_are_those_of_python(ask: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    rng = random.Random(SEED + 23)
+    n_more = 0
+    for name, cells in GROWING.items():
+        monkeypatch.setitem(asking_c.CELLS, name, [*CELLS[name], *cells])
+    for turn in range(30 * TIMES):
+        for name, reaches in REACHES.items():
+            monkeypatch.setitem(asking_c.SCHEMA, name, {**SCHEMA[name], "hysteresis": rng.choice(reaches)})
+        if turn % 10 == 3:
+            compiled = wide_table(rng)
+        elif turn % 3 == 0:
+            compiled = ruled_table(rng, 20)
+        else:
+            compiled = random_nest(rng, 15) if turn % 3 == 1 else random_table(rng, rng.choice([1, 20, 70]))
+        moments = moments_of(rng, 12)
+        [answers] = all_asked(ask, tmp_path, conditions_of(data_of(compiled)), [artefact(compiled, tmp_path)], moments, memory=1)
+        for (unknown, facts), (status, rows), told in zip(moments, answers.rows, answers.told, strict=True):
+            assert (told.widened[0] == OK) is (status == OK)
+            if status == OK:
+                expected = data_of(compiled).query_widened(facts, unknown)
+                assert told.widened[1] == expected.bits, (unknown, facts)
+                assert told.widened_penalties == (OK, expected.penalties.tolist()), (unknown, facts)
+                n_more += expected.bits != rows
+    assert n_more > 50
+
+
+def wide_table(rng: random.Random) -> CompiledTable:
+    """A table with a column whose bounds are so many that it keeps its masks in digits."""
+    starts = [rng.uniform(-20.0, 20.0) for _ in range(3000)]
+    columns = {
+        "speed": [f"{start:.6f}..{start + 0.5:.6f}" for start in starts],
+        "heading": [f"{9 * start:.6f}, 3" for start in starts],
+    }
+    compiled = Table.from_columns({"Asset": ["a"] * len(starts), **columns}, SCHEMA).compile()
+    assert all(isinstance(masks, WideMasks) for masks in data_of(compiled).masks)
+    return compiled
 
 
 def test_a_row_whose_rule_is_open_is_a_fault_where_only_that_keeps_it_from_being_valid(ask: Path, tmp_path: Path):

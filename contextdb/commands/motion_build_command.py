@@ -23,7 +23,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from random import Random
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.mirroring import changed_in_mirror, mirrored_fact, partner_of, way_of
@@ -37,6 +36,7 @@ from contextdb.disk.engines import Engines
 from contextdb.errors import ContextDBError, Fault, FileError, MotionError, Place, in_quotes, plural, some
 from contextdb.files.tensors import other_layout
 from contextdb.motion.characters.facts import FACTS, is_asked
+from contextdb.motion.characters.played import of_played
 from contextdb.motion.clips.doubts import grouped
 from contextdb.motion.nodes.match_node import MatchNode
 from contextdb.motion.search.database import MotionDatabase
@@ -283,7 +283,7 @@ def bundled(tables: Mapping[str, Table], config: MotionConfig, databases: Mappin
         schema = config.features[config.databases[names[0]].features]
         own = {each: banks[each] for each in config.played_by(name) if each in banks}
         ends = {each: MatchNode(databases[each]).ends for each in names if each in own}
-        controller = config.controller(name, databases, rng=Random(0))
+        controller = config.controller(name, databases)
         players[name] = Played(controller, schema, own or None, config.output_of(name), ends)
     joint = dict.fromkeys(each for names in config.joint_clips.values() for each in names)
     return bundle_of(players, table_of, compiled, {each: config.joint_searcher(each, databases) for each in joint})
@@ -296,7 +296,9 @@ def file_of(name: str, table: CompiledTable) -> TableFile:
         table.save(file)
         octets = file.read_bytes()
     conditions = table.asked
-    own = {each: each[0] for each, of in FACTS.items() if each in conditions and is_asked(each, of, conditions[each])}
+    played = {each: of_played(each, condition) for each, condition in conditions.items()}
+    own = {each: fact.letter for each, fact in played.items() if fact is not None}
+    own |= {each: each[0] for each, of in FACTS.items() if each in conditions and is_asked(each, of, conditions[each])}
     changed = {each.name: _mirror_text(name, each) for each in changed_in_mirror(conditions.values()).values()}
     return TableFile(octets, table.leaves, own, changed)
 

@@ -17,7 +17,6 @@ from __future__ import annotations
 import argparse
 import math
 import os
-import random
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -133,7 +132,7 @@ def _project(folder: Path, out: Path) -> dict[str, str]:
 
 def character_of(stage: Stage, name: str, seed: int = 0, unknown: Unknown = "error") -> motion.Character:
     """The character of a controller, with its poses; without where its databases have no clips."""
-    controller = stage.config.controller(name, stage.databases, rng=random.Random(seed))
+    controller = stage.config.controller(name, stage.databases, rng=seed)
     names = list(controller.selector.names)
     assets = {table: leaf_assets(stage.project[table]) for table in stage.project.tables}
     joint = {each: stage.databases[each] for each in stage.config.joint_databases_of(name)}

@@ -14,6 +14,7 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     CCC.FIELD              as in contextdb.compiled.classes, for condition number CCC: `masks` (and `bounds`), or `low`, `high`,
     `any_mask` CCC.codes              int32 [R]             which of the distinct texts each row holds
     CCC.texts              uint8                 JSON list of the distinct texts
+    CCC.hysteresis         float64 [1]           where the condition has one
     slots.CCC.codes        as CCC.codes and CCC.texts, for the columns of slots, named in `about`
     slots.CCC.texts
     outputs.declared       uint8                 JSON list: name, type, default, bounds, values, size, unit, description of each
@@ -66,6 +67,8 @@ import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
@@ -121,6 +124,8 @@ def save(compiled: CompiledData, path: Path) -> None:
         )
         tensors[f"{at:03d}.codes"] = texts.codes
         tensors[f"{at:03d}.texts"] = texts_to_array(list(texts.texts))
+        if reach := compiled.conditions[at].hysteresis:
+            tensors[f"{at:03d}.hysteresis"] = np.array([reach])
         if soft is not None:
             tensors[f"{at:03d}.soft.penalties"] = soft.penalties
             if soft.growth is not None:

@@ -121,6 +121,15 @@ class Boxes:
 def direction_of(x: float, z: float, heading: float, /) -> float:
     """Where a stick points against the way a body faces, degrees."""
 
+def until_down_s(contacts: NDArray[np.bool_], foot: int, is_looping: bool, rate: float, at_s: float, /) -> float:
+    """Seconds until a foot is down, by the contacts of all frames and feet of a clip."""
+
+def going(path: NDArray[np.float32], rate: float, at_s: float, /) -> tuple[float, float]:
+    """How fast a clip goes, m/s, and turns, degrees a second, about a second of it."""
+
+def phase(n_frames: int, rate: float, at_s: float, /) -> float:
+    """The share of a clip that has played at a second of it."""
+
 def motion_then(
     left: float, ahead: float, turn: float, then_left: float, then_ahead: float, then_turn: float, /
 ) -> tuple[float, float, float]:
@@ -514,6 +523,9 @@ class Controllers:
         settle_s: float,
         asset_history_s: float,
         until_natural: bool,
+        varies: bool,
+        vary_within: float,
+        n_recent: int,
     ) -> None: ...
     @property
     def width(self) -> int:

@@ -148,6 +148,12 @@ static inline int cdbi_take_condition(cdbi_opening *opening, size_t at, const ch
 {
     cdb_table *table = opening->table;
     size_t n_soft = table->n_depths * table->n_rows;
+    if (strcmp(part, "hysteresis") == 0) {
+        if (!cdbi_fits(array, "F64", 1, 1) || array->shape[0] != 1 || !cdbi_is_numeric(opening->schema->conditions[at].type)) return 0;
+        opening->columns[at].hysteresis = *(const double *)(const void *)array->at;
+        if (table->soft) table->soft[at].column.hysteresis = opening->columns[at].hysteresis;
+        return 1;
+    }
     if (strncmp(part, "soft.", 5) != 0) return cdbi_take_part(&opening->columns[at], part, array, table->n_words);
     if (!table->soft || table->soft[at].column.kind == 0) return 1;
     if (cdbi_is_growth(part + 5)) return cdbi_take_growth(&table->soft[at], part + 5, array, n_soft);

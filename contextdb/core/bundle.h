@@ -1,13 +1,13 @@
 /* ---- A bundle: all that the characters of a game need of its motion, in one file that is mapped into memory and read where it is.
  *
- *   64 bytes        "CDBMOTN1", the size of the file, a digest of all behind it, the number of parts, 0
+ *   64 bytes        "CDBMOTN2", the size of the file, a digest of all behind it, the number of parts, 0
  *   24 bytes a part its kind, a number (which database, bank, controller or table), where it begins, how many bytes it is
  *   the parts       each begins on a multiple of 64
  *
  * All numbers are little-endian. Whatever is read by number is checked when it is opened: a damaged bundle is refused, or plays
  * something else, and never reads outside of itself. */
 
-#define CDBM_MAGIC "CDBMOTN1"
+#define CDBM_MAGIC "CDBMOTN2"
 
 enum {  /* kinds of parts; of a database, of a bank, of a controller, of a table */
     CDBM_P_BLOCKS = 1, CDBM_P_ORDER, CDBM_P_RANK, CDBM_P_BOX_STARTS, CDBM_P_BOX_SIZES, CDBM_P_BOX_RANGES, CDBM_P_BOX_KINDS,
@@ -15,7 +15,8 @@ enum {  /* kinds of parts; of a database, of a bank, of a controller, of a table
     CDBM_P_STOPS, CDBM_P_ASSET_RANGES, CDBM_P_LOOPING, CDBM_P_ROOT, CDBM_P_MARKS, CDBM_P_ROOT_WEIGHTS, CDBM_P_DATABASE, CDBM_P_POSE_RANGES, CDBM_P_ASSETS,
     CDBM_P_MIRRORED, CDBM_P_ROW_STARTS, CDBM_P_ROWS, CDBM_P_NAME, CDBM_P_LEVEL_STEP, CDBM_P_LEVELS,
     CDBM_P_EVENT_NAMES = 34, CDBM_P_EVENT_STARTS, CDBM_P_EVENT_FRAMES, CDBM_P_WARPS, CDBM_P_ENDS,
-    CDBM_P_POSE_ROTATIONS = 40, CDBM_P_POSE_POSITIONS, CDBM_P_POSE_ROOT, CDBM_P_POSE_WAYS, CDBM_P_POSE_CONTACTS, CDBM_P_POSE_STEPS,
+    CDBM_P_ASSET_KEYS, CDBM_P_FACT_TAGS,
+    CDBM_P_POSE_ROTATIONS = 44, CDBM_P_POSE_POSITIONS, CDBM_P_POSE_ROOT, CDBM_P_POSE_WAYS, CDBM_P_POSE_CONTACTS, CDBM_P_POSE_STEPS,
     CDBM_P_POSE_STARTS, CDBM_P_POSE_N_STEPS, CDBM_P_POSE_LOOPING, CDBM_P_POSE_RATE,
     CDBM_P_ENTRIES = 60, CDBM_P_SETTINGS, CDBM_P_THRESHOLDS, CDBM_P_BARS, CDBM_P_RANGE_BIASES, CDBM_P_ALLOWED, CDBM_P_PLAYABLE,
     CDBM_P_KIND_BIASES, CDBM_P_STEPS, CDBM_P_FEATURES, CDBM_P_VELOCITIES, CDBM_P_OUTPUT, CDBM_P_PARENTS, CDBM_P_OFFSETS, CDBM_P_PLACES,
@@ -199,6 +200,7 @@ static inline void cdbm_read_database(cdbm_bundle *bundle, size_t number, cdbm_f
     clips->frames = frames, clips->n_ranges = frames->n_ranges;
     clips->starts = CDBM_TAKE(int64_t, CDBM_P_STARTS, clips->n_ranges), clips->stops = CDBM_TAKE(int64_t, CDBM_P_STOPS, clips->n_ranges);
     clips->assets = CDBM_TAKE(int64_t, CDBM_P_ASSET_RANGES, clips->n_ranges);
+    clips->keys = CDBM_TAKE(double, CDBM_P_ASSET_KEYS, clips->n_ranges);
     clips->looping = CDBM_TAKE(uint8_t, CDBM_P_LOOPING, clips->n_ranges);
     clips->root = (const float *)cdbm_find(bundle, CDBM_P_ROOT, number, sizeof(float), &n);
     if (clips->root && n != 3 * frames->n_frames) cdbm_refuse(bundle, "there is not one place for each frame");

@@ -11,10 +11,11 @@
  * works in room that it is given, which only one call uses at a time.
  *
  * A game gives the facts of each table, or its valid rows. A fact that is missing and that the character knows itself (its speed, the
- * direction of its stick, its turn) it adds. */
+ * direction of its stick, its turn, and those of what plays) it adds. */
 
 #define CDBM_MOST_DATABASES 64
 #define CDBM_MOST_TABLES 16
+#define CDBM_MOST_RECENT 1000       /* so many assets may be remembered */
 #define CDBM_MOST_BELOW 16          /* so many feet may feel a ground */
 
 typedef struct cdbm_player {
@@ -215,7 +216,7 @@ static inline const char *cdbm_open_player(cdbm_player *player, const cdbm_bundl
     entries = CDBM_TAKE_ALL(int64_t, CDBM_P_ENTRIES, &n_entries);
     settings = CDBM_TAKE_ALL(double, CDBM_P_SETTINGS, &n_settings);
     more = (const int64_t *)cdbm_find(bundle, CDBM_P_MORE, number, 3 * sizeof(int64_t), &n_more);
-    if (n_entries % 3 || n_entries == 0 || n_settings != 13) cdbm_refuse(bundle, "a controller is damaged");
+    if (n_entries % 3 || n_entries == 0 || n_settings != 16) cdbm_refuse(bundle, "a controller is damaged");
     n_entries /= 3, n_more = more ? n_more : 0;
     if (n_entries > CDBM_MOST_DATABASES || n_more > CDBM_MOST_DATABASES - n_entries) cdbm_refuse(bundle, "a controller has more databases than can be read");
     if (bundle->why) return bundle->why;
@@ -225,9 +226,10 @@ static inline const char *cdbm_open_player(cdbm_player *player, const cdbm_bundl
     to->until_natural = settings[7] != 0.0, player->has_poses = settings[8] != 0.0;
     player->velocity_halflife_s = player->heading_halflife_s = settings[9], player->ways.rate = settings[10];
     to->settle_s = settings[11], to->asset_history_s = settings[12];
+    to->varies = settings[13] != 0.0, to->n_recent = cdbm_size_from(settings[14]), to->vary_within = settings[15];
     for (i = 0; i < n_settings; i++)
-        if (!(settings[i] >= 0.0 && settings[i] <= 1e6)) cdbm_refuse(bundle, "a setting of a controller is none");
-    if (to->n_played > 1024) cdbm_refuse(bundle, "a controller is damaged");
+        if (!(settings[i] >= 0.0 && (settings[i] <= 1e6 || i == 15))) cdbm_refuse(bundle, "a setting of a controller is none");
+    if (to->n_played > 1024 || to->n_recent > CDBM_MOST_RECENT) cdbm_refuse(bundle, "a controller is damaged");
     cdbm_read_tables(bundle, player);
     if (player->has_poses && !bundle->why) cdbm_read_output(bundle, number, player);
     to->databases = player->clips, to->n_databases = bundle->why ? 0 : n_entries;
@@ -306,7 +308,7 @@ static inline size_t cdbm_room_size(const cdbm_player *player, size_t n)
     size_t each = cdbm_rounded(cdbm_state_size(player)) + cdbm_rounded(n_features * sizeof(double)) + cdbm_rounded(sizeof(cdbm_moved))
         + cdbm_rounded(player->n_ranges) + 2 * cdbm_rounded(player->n_ranges * sizeof(double)) + 2 * cdbm_rounded(cdbm_width(&player->controller) * sizeof(double)) + 64
         + cdbm_rounded(player->controller.n_databases * (sizeof(cdbm_found) + 1)) + cdbm_rounded(sizeof(cdbm_decision))
-        + cdbm_rounded(sizeof(cdbm_followed));
+        + cdbm_rounded(sizeof(cdbm_followed)) + cdbm_rounded(sizeof(double));
     return n * each + cdbm_rounded((4 * n_frames + 3 * n_features) * sizeof(double)) + cdbm_choice_room(&player->controller, n)
         + cdbm_rounded(player->n_frames * sizeof(double)) + cdbm_rounded(player->n_frames)
         + cdbm_rounded((player->has_poses ? cdbo_pose_room(&player->poses) : 0) * sizeof(double)) + cdbm_answer_room(player)
@@ -329,16 +331,21 @@ static inline void cdbm_begin(const cdbm_player *player, double *state, double x
     if (player->has_poses) cdbo_poses_begin(&player->poses, cdbm_pose_part(player, state));
 }
 
+/* Let chance go by another seed than 0, where what plays varies: equal seeds vary equally. */
+static inline void cdbm_seed(const cdbm_player *player, double *state, uint64_t seed)
+{
+    cdbm_state *played = (cdbm_state *)(void *)cdbm_played_part(player, state);
+    played->seed = (double)(seed & 0x1FFFFFFFFFFFFF), played->n_drawn = 0.0;
+}
+
 /* Whether a block may be a character of this player: to be asked of one that comes from elsewhere. */
 static inline int cdbm_is_state(const cdbm_player *player, const double *state)
 {
     double *own = (double *)(uintptr_t)state;
     const cdbm_walk *walk = (const cdbm_walk *)(const void *)state;
-    const cdbm_state *played = (const cdbm_state *)(const void *)cdbm_played_part(player, own);
     const cdbo_instant *displayed = cdbm_displayed(player, own);
     if (!(walk->n_trail >= 0.0 && walk->n_trail <= (double)player->ways.n_trail)) return 0;
-    if (!(played->n_played >= 0.0 && played->n_played <= (double)player->controller.n_played)) return 0;
-    if (!cdbm_is_playing(&player->controller, &played->playing)) return 0;
+    if (!cdbm_is_row(&player->controller, cdbm_played_part(player, own))) return 0;
     return !player->has_poses || displayed->bank < 0.0 || cdbo_is_moment(&player->poses, displayed->bank, displayed->range);
 }
 
@@ -352,6 +359,7 @@ typedef struct cdbm_many {          /* a crowd in an update, in room */
     cdbm_decision *decisions;
     cdbm_followed *followed;
     uint8_t *ranges, *among, *urgent;
+    double *wide;
 } cdbm_many;
 
 static inline int cdbm_take_many(const cdbm_player *player, size_t n, cdbm_many *many, cdbm_room *room)
@@ -364,7 +372,8 @@ static inline int cdbm_take_many(const cdbm_player *player, size_t n, cdbm_many 
     many->ranges = (uint8_t *)cdbm_part(room, n * player->n_ranges), many->urgent = (uint8_t *)cdbm_part(room, n);
     many->biases = (double *)cdbm_part(room, n * player->n_ranges * sizeof(double));
     many->play_of = (int64_t *)cdbm_part(room, n * player->n_ranges * sizeof(int64_t));
-    if (!many->biases || !many->play_of) return 0;
+    many->wide = (double *)cdbm_part(room, n * sizeof *many->wide);
+    if (!many->biases || !many->play_of || !many->wide) return 0;
     many->among = (uint8_t *)cdbm_part(room, n * player->controller.n_databases);
     many->followed = (cdbm_followed *)cdbm_part(room, n * sizeof *many->followed);
     return many->followed && many->states && many->queries && many->moved && many->found && many->decisions && many->ranges && many->urgent && many->among;
@@ -388,15 +397,54 @@ static inline const char *cdbm_said_of(const cdbm_player *player, uint32_t kind,
     return NULL;
 }
 
-/* A fact that a game does not give and that the character knows itself. */
-static inline void cdbm_add_own(const cdbm_player *player, size_t table, size_t at, const cdbm_walk *walk, const cdbo_goal *goal, cdb_fact *fact)
+/* Whether the frame that plays has a tag of that number in the bundle, or one below it. */
+static inline int cdbm_has_tag(const cdbm_player *player, size_t database, int64_t frame, const char *number)
+{
+    const cdbm_clips *clips = &player->clips[database];
+    size_t n, tag = 0, kind = (size_t)(clips->frames->kinds ? clips->frames->kinds[frame] : 0);
+    const uint8_t *tags = (const uint8_t *)cdbm_find(&player->bundle, CDBM_P_FACT_TAGS, (size_t)player->database_of[database], 1, &n);
+    for (; *number >= '0' && *number <= '9' && tag < 1 << 20; number++) tag = 10 * tag + (size_t)(*number - '0');
+    return tags && tag * clips->n_kinds + kind < n && tags[tag * clips->n_kinds + kind];
+}
+
+/* A fact of what plays, by the letter that a bundle has for it, see contextdb/motion/characters/played.py. */
+static inline double cdbm_fact_of(const cdbm_player *player, const cdbm_playing *playing, char letter, const char *more)
+{
+    int is_until = letter == 'L' || letter == 'R', is_foot = is_until || letter == 'l' || letter == 'r';
+    const cdbm_clips *clips;
+    size_t database, range, n;
+    double speed, turn, until_s = CDBM_MOST_UNTIL_S;
+    if (playing->database < 0.0) return is_until ? until_s : 0.0;
+    database = (size_t)playing->database, range = (size_t)playing->range, clips = &player->clips[database];
+    n = (size_t)(clips->stops[range] - clips->starts[range]);
+    if (is_foot && player->has_poses) {
+        const cdbo_frames *bank = player->bank_list[player->bank_of[database]];
+        size_t own = (size_t)player->pose_ranges[database][range];
+        until_s = cdbm_until_down_s(bank->contacts + (size_t)bank->starts[own] * bank->n_feet, (size_t)bank->n_steps[own] + 1, bank->n_feet,
+            letter == 'R' || letter == 'r', bank->looping[own], bank->rate, playing->at_s);
+    }
+    if (is_foot) return is_until ? until_s : until_s == 0.0;
+    if (letter == 'g') return cdbm_has_tag(player, database, (int64_t)playing->frame, more);
+    if (letter == 'p') return cdbm_phase(n, clips->rate, playing->at_s);
+    if (!clips->root) return 0.0;
+    cdbm_going(clips->root + 3 * clips->starts[range], n, clips->rate, playing->at_s, &speed, &turn);
+    return letter == 'v' ? speed : turn;
+}
+
+/* A fact that a game does not give and that the character knows itself: of its body, or of what plays until now. */
+static inline void cdbm_add_own(const cdbm_player *player, size_t table, size_t at, const double *state, const cdbo_goal *goal, cdb_fact *fact)
 {
     const cdb_condition *condition = &player->opened[table]->schema.conditions[at];
+    const cdbm_state *played = (const cdbm_state *)(const void *)cdbm_played_part(player, (double *)(uintptr_t)state);
+    const char *more;
     char letter = 0;
+    double number;
     if (condition->expr || !cdbi_is_missing(condition, fact)) return;
-    if (!cdbi_is_double(condition->type)) return;
-    if (!cdbm_said_of(player, CDBM_P_OWN_FACTS, table, condition->name, &letter)) return;
-    fact->number = cdbm_own_fact(walk, goal, letter);
+    if (!(more = cdbm_said_of(player, CDBM_P_OWN_FACTS, table, condition->name, &letter))) return;
+    if (letter == 's' || letter == 'd' || letter == 't') number = cdbm_own_fact((const cdbm_walk *)(const void *)state, goal, letter);
+    else number = cdbm_fact_of(player, &played->playing, letter, more);
+    if (cdbi_is_double(condition->type)) fact->number = number;
+    else if (condition->type == CDB_BOOL) fact->whole = number != 0.0;
 }
 
 /* The facts as a mirror shows them; whether any is another. */
@@ -431,8 +479,9 @@ typedef struct cdbm_answer {        /* of a table, as it is and with mirrored fa
     const double *costs[2];
 } cdbm_answer;
 
-/* Ask a table. 1; -2 for a fact that is refused. */
-static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const cdbm_input *input, const cdbm_walk *walk,
+/* Ask a table; for what plays already, where `is_wide`, with cells that are widened. 1; 0 with too little room; -2 for a fact that is
+ * refused. */
+static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const cdbm_input *input, const double *state, int is_wide,
     cdbm_answer *answer, cdbm_room *room)
 {
     const cdb_any *any = player->opened[table];
@@ -441,7 +490,7 @@ static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const 
     size_t n_words = any->table.n_words, n_rows = any->table.n_rows, i, side;
     for (i = 0; i < schema->n_conditions; i++) {
         own[i] = input->facts && input->facts[table] ? input->facts[table][i] : cdbi_missing(&schema->conditions[i]);
-        cdbm_add_own(player, table, i, walk, &input->goal, &own[i]);
+        cdbm_add_own(player, table, i, state, &input->goal, &own[i]);
     }
     for (side = 0; side < 2; side++) {
         uint64_t *mask = (uint64_t *)cdbm_part(room, n_words * sizeof(uint64_t));
@@ -452,8 +501,10 @@ static inline int cdbm_ask_table(const cdbm_player *player, size_t table, const 
         }
         if (side == 1) facts = mirrored;
         if (!mask || (any->table.soft && !costs)) return 0;
-        if (cdb_query(&any->table, any->columns, schema, facts, input->unknown, mask, n_words, input->fault) != CDB_OK) return -2;
-        if (costs && cdb_penalties(&any->table, any->columns, schema, facts, input->unknown, costs, n_rows, input->fault) != CDB_OK) return -2;
+        if ((is_wide ? cdb_query_widened : cdb_query)(&any->table, any->columns, schema, facts, input->unknown, mask, n_words, input->fault) != CDB_OK)
+            return -2;
+        if (costs && (is_wide ? cdb_penalties_widened : cdb_penalties)(&any->table, any->columns, schema, facts, input->unknown, costs, n_rows,
+                input->fault) != CDB_OK) return -2;
         answer->masks[side] = mask, answer->costs[side] = costs;
     }
     return 1;
@@ -478,7 +529,7 @@ static inline int cdbm_let_play(const cdbm_player *player, const cdbm_input *inp
                 answer.masks[1] = input->mirrored && input->mirrored[table] ? input->mirrored[table] : answer.masks[0];
                 if (!answer.masks[0]) continue;
             } else if (!answer.masks[0]) {
-                int is_done = cdbm_ask_table(player, table, input, (const cdbm_walk *)(const void *)state, &answer, &left);
+                int is_done = cdbm_ask_table(player, table, input, state, 0, &answer, &left);
                 if (is_done != 1) return is_done;
             }
             cdbm_fill_ranges(&player->tables[i], answer.masks, answer.costs[0] ? answer.costs : NULL, player->range_biases, ranges, biases,
@@ -488,6 +539,39 @@ static inline int cdbm_let_play(const cdbm_player *player, const cdbm_input *inp
                     if (play_of[r] >= 0) play_of[r] += player->plays_at[table];
         }
     }
+    return 1;
+}
+
+/* Whether a condition of a table has a hysteresis. */
+static inline int cdbm_is_widening(const cdb_any *any)
+{
+    size_t i;
+    for (i = 0; i < any->schema.n_conditions; i++)
+        if (any->columns[i].hysteresis > 0.0) return 1;
+    return 0;
+}
+
+/* Write the bias of what would play on where its table, widened, lets that play and else does not; NAN otherwise. As cdbm_let_play. */
+static inline int cdbm_let_play_on(const cdbm_player *player, const cdbm_input *input, const double *state, const cdbm_moved *moved,
+    const uint8_t *ranges, double *wide, cdbm_room room)
+{
+    size_t database = (size_t)moved->to.database, range = (size_t)moved->to.range, at;
+    cdbm_answer answer = {{NULL, NULL}, {NULL, NULL}};
+    cdbm_table_ranges one;
+    uint8_t is_valid = 0;
+    double bias;
+    int is_done;
+    *wide = NAN;
+    if (moved->to.database < 0.0 || input->rows || player->table_of[database] < 0) return 1;
+    at = player->clips[database].range_at + range;
+    if (ranges[at] || !cdbm_is_widening(player->opened[player->table_of[database]])) return 1;
+    is_done = cdbm_ask_table(player, (size_t)player->table_of[database], input, state, 1, &answer, &room);
+    if (is_done != 1) return is_done;
+    one = player->tables[database];
+    one.n_ranges = 1, one.at = 0, one.starts += range, one.mirrored += range;
+    bias = player->range_biases[at];
+    cdbm_fill_ranges(&one, answer.masks, answer.costs[0] ? answer.costs : NULL, player->range_biases + at, &is_valid, &bias, NULL);
+    if (is_valid) *wide = bias;
     return 1;
 }
 
@@ -687,7 +771,7 @@ static inline int cdbm_decide_for_event(const cdbm_player *player, const cdbm_in
     cdbm_ask(controller, &own, i, before + i * width, moved, after + i * width, &many->decisions[i], numbers);
     is_done = cdbm_choose(controller, &own, i, i + 1, after, many->moved, many->decisions, many->found, room);
     if (is_done != 1) return is_done;
-    cdbm_compare(controller, &own, i, moved, &many->decisions[i], numbers);
+    if (!cdbm_weigh(controller, &own, i, after + i * width, moved, &many->decisions[i], numbers, room)) return 0;
     cdbm_decide(controller, &own, i, before + i * width, moved, after + i * width, &many->decisions[i]);
     return 1;
 }
@@ -718,7 +802,7 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
     cdbm_given given;
     cdbm_many many;
     cdbm_room left;
-    int is_done = 1;
+    int is_done = 1, is_any_wide = 0;
     if (!(dt_s >= 0.0 && dt_s <= 1e6) || !cdbm_take_many(player, n, &many, &room)) return dt_s >= 0.0 && dt_s <= 1e6 ? 0 : -1;
     memset(&given, 0, sizeof given);
     memset(many.among, 1, n * controller->n_databases);
@@ -736,13 +820,18 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
             if ((is_done = cdbm_bring(player, states + i * width, dt_s, input.one_off, &body, room)) != 1) return is_done;
             input.body = &body;
         }
+        many.wide[i] = NAN;
         many.urgent[i] = (uint8_t)((inputs[i].force ? CDBM_FORCE : 0) | (inputs[i].interrupt ? CDBM_INTERRUPT : 0));
         if (!cdbm_query_of(player, &input, dt_s, states + i * width, many.states + i * width, &many.moved[i],
                 many.queries + i * n_features, room)) return 0;
         is_done = inputs[i].is_copy ? cdbm_let_follow(player, &inputs[i], &many, i) : cdbm_let_play(player, &inputs[i], many.states + i * width, many.ranges + i * player->n_ranges,
             many.biases + i * player->n_ranges, many.play_of + i * player->n_ranges, room);
+        if (is_done == 1 && !inputs[i].is_copy)
+            is_done = cdbm_let_play_on(player, &inputs[i], many.states + i * width, &many.moved[i], many.ranges + i * player->n_ranges, &many.wide[i], room);
         if (is_done != 1) return is_done;
+        is_any_wide |= many.wide[i] == many.wide[i];
     }
+    if (is_any_wide) given.wide = many.wide;
     left = room;
     before = (double *)cdbm_part(&left, n * played * sizeof(double)), after = (double *)cdbm_part(&left, n * played * sizeof(double));
     numbers = (double *)cdbm_part(&left, n_features * sizeof(double));
@@ -768,7 +857,8 @@ static inline int cdbm_update_all(const cdbm_player *player, size_t n, double *s
         cdbm_room rest = left;
         if (inputs[i].is_copy && inputs[i].event && !cdbm_give_event(player, &inputs[i], many.play_of + i * player->n_ranges, &own, &rest)) return 0;
         if (inputs[i].is_copy) own.plays = &many.followed[i].play, own.flags = NULL;
-        else if (!inputs[i].event) cdbm_compare(controller, &given, i, &many.moved[i], &many.decisions[i], numbers);
+        else if (!inputs[i].event && !cdbm_weigh(controller, &given, i, after + i * played, &many.moved[i], &many.decisions[i], numbers, left))
+            return 0;
         if (!cdbm_seeks_event(&inputs[i]))
             cdbm_decide(controller, &own, i, before + i * played, &many.moved[i], after + i * played, &many.decisions[i]);
         memcpy(cdbm_played_part(player, many.states + i * width), after + i * played, played * sizeof(double));

@@ -3,9 +3,11 @@
  *   cdbm_move      what plays, some time later, before any search
  *   cdbm_ask       why it searches now, or what lets it play on without
  *   cdbm_choose    the best frame, from the databases in their order
+ *   cdbm_weigh     what it costs to play on, and whether another frame is to play that is about as good as the best
  *   cdbm_decide    what plays then, and where the character is for the next update
  *
- * Between two updates a character is a row of numbers: a cdbm_state, and behind it what it has played lately. Nothing is changed in
+ * Between two updates a character is a row of numbers: a cdbm_state, and behind it what it has played lately, and the assets that
+ * variation remembers. Nothing is changed in
  * place: an update writes a new row, so that old ones stay good for a rollback. All records hold doubles alone, as they come in
  * arrays; where a number is one of several things it is the number of its word, see contextdb/motion/selection.
  *
@@ -15,6 +17,7 @@
 #define CDBM_TOLERANCE_S 1e-6 /* times that are nearer than this are the same: sums of time steps are rounded */
 #define CDBM_RATE_SHARE 0.36  /* so much of a missing speed is made up for by the play rate, in logarithms */
 #define CDBM_RATE_HALFLIFE_S 0.2
+#define CDBM_MOST_SEED 9007199254740992.0 /* 2 to the 53rd */
 #define CDBM_LEAST_MPS 0.2    /* a clip or character that is slower stands: nothing is made up for */
 
 typedef enum cdbm_cause { CDBM_NOT_DUE, CDBM_NOTHING_PLAYS, CDBM_LOST, CDBM_ENDED, CDBM_NOT_AMONG, CDBM_INTERRUPTED, CDBM_NOT_VALID,
@@ -32,6 +35,7 @@ typedef struct cdbm_clips {   /* a database, as a controller sees it; without fr
     const cdbm_frames *frames;
     const int64_t *starts, *stops;   /* [R] */
     const int64_t *assets;           /* [R] the first range of the same asset */
+    const double *keys;              /* [R] a number of its asset, the same in all databases; NULL where nothing varies */
     const uint8_t *looping;          /* [R] */
     const float *root;               /* [N, 3]: x, z and heading; NULL where it does not know */
     const uint8_t *marks;            /* [K] flags of each kind of frames */
@@ -48,7 +52,9 @@ typedef struct cdbm_controller { /* what characters share */
     const cdbm_clips *databases;
     size_t n_databases, n_features, n_played; /* n_played: so much of what was played is remembered at most */
     double search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, settle_s, asset_history_s;
-    int until_natural;
+    double vary_within;              /* frames that cost at most so much more than the best are as good as it */
+    size_t n_recent;                 /* so many of the last assets are not chosen while another is as good */
+    int until_natural, varies;
 } cdbm_controller;
 
 typedef struct cdbm_playing { double database, range, frame, at_s; } cdbm_playing;
@@ -57,9 +63,10 @@ typedef struct cdbm_played { double database, start, stop, time_s; } cdbm_played
 typedef struct cdbm_state {
     double tick, time_s, since_search_s, rate, waiting_since_s; /* NaN: no jump waits */
     cdbm_playing playing;
-    double n_played;             /* behind the state */
+    double n_played;             /* behind the state; behind those the keys of the last assets, the latest first, 0 for none */
     cdb_row_play play;           /* how the row of what plays says that it does */
     double entered_s;            /* when it was entered */
+    double seed, n_drawn;        /* of chance, whole numbers below CDBM_MOST_SEED; how often it has decided */
 } cdbm_state;
 
 typedef struct cdbm_moved {
@@ -302,12 +309,25 @@ static inline void cdbm_features(const cdbm_frames *frames, int64_t frame, doubl
 
 static inline size_t cdbm_width(const cdbm_controller *controller)
 {
-    return (sizeof(cdbm_state) + controller->n_played * sizeof(cdbm_played)) / sizeof(double);
+    return (sizeof(cdbm_state) + controller->n_played * sizeof(cdbm_played)) / sizeof(double) + controller->n_recent;
 }
 
 static inline cdbm_played *cdbm_played_of(double *row)
 {
     return (cdbm_played *)(row + sizeof(cdbm_state) / sizeof(double));
+}
+
+static inline double *cdbm_recent_of(const cdbm_controller *controller, double *row)
+{
+    return (double *)(cdbm_played_of(row) + controller->n_played);
+}
+
+/* Whether a row is that of a character with these databases. */
+static inline int cdbm_is_row(const cdbm_controller *controller, const double *row)
+{
+    const cdbm_state *state = (const cdbm_state *)row;
+    if (!(state->seed >= 0.0 && state->seed < CDBM_MOST_SEED && state->n_drawn >= 0.0 && state->n_drawn < CDBM_MOST_SEED)) return 0;
+    return cdbm_is_playing(controller, &state->playing) && state->n_played >= 0.0 && state->n_played <= (double)controller->n_played;
 }
 
 /* How far a range is from the first permutation of its clip, in frames. */
@@ -648,7 +668,8 @@ static inline size_t cdbm_choice_room(const cdbm_controller *controller, size_t 
     size_t n_ranges, n_skips, n_bytes;
     if (n > CDBM_TILE) n = CDBM_TILE;
     cdbm_measure_choosing(controller, n, &n_ranges, &n_skips, &n_bytes);
-    return n_bytes + cdbm_rounded(n * sizeof(size_t)) + cdbm_rounded(n * (controller->n_features + n_ranges + 1) * sizeof(double))
+    return n_bytes + (controller->varies ? 2 * cdbm_rounded(n_ranges * sizeof(double)) : 0) + cdbm_rounded(n * sizeof(size_t))
+        + cdbm_rounded(n * (controller->n_features + n_ranges + 1) * sizeof(double))
         + cdbm_rounded(n * (n_ranges + 1)) + cdbm_rounded((n * (2 * n_skips + 4) + 1) * sizeof(int64_t));
 }
 
@@ -670,9 +691,20 @@ static inline int cdbm_take_choosing(const cdbm_controller *controller, cdbm_cho
     return 1;
 }
 
+/* Whether one mask, and one list of biases of ranges, is that of all. */
+static inline int cdbm_is_one_mask(const cdbm_given *given)
+{
+    return given->ranges_step == 0 && !given->wide;
+}
+
+static inline int cdbm_are_same_biases(const cdbm_given *given)
+{
+    return given->biases_step == 0 && !given->wide;
+}
+
 /* Put what one character asks of a database behind the others. */
 static inline void cdbm_put_question(const cdbm_controller *controller, const cdbm_given *given, size_t i, const double *after,
-    const cdbm_moved *move, const cdbm_decision *decision, size_t database, cdbm_choosing *room, size_t at, int is_one_mask, int are_same)
+    const cdbm_moved *move, const cdbm_decision *decision, size_t database, cdbm_choosing *room, size_t at)
 {
     const cdbm_clips *clips = &controller->databases[database];
     size_t n_features = controller->n_features, n_ranges = clips->n_ranges;
@@ -683,11 +715,28 @@ static inline void cdbm_put_question(const cdbm_controller *controller, const cd
     room->skip_stops[at + 1] = room->skip_stops[at] + (int64_t)skips.n;
     room->currents[at] = is_own ? (int64_t)decision->current : -1;
     memcpy(room->queries + at * n_features, given->queries + i * n_features, n_features * sizeof(double));
-    if (!is_one_mask) memcpy(room->ranges + at * n_ranges, given->ranges + i * given->ranges_step + clips->range_at, n_ranges);
-    if (!are_same)
+    if (!cdbm_is_one_mask(given)) memcpy(room->ranges + at * n_ranges, given->ranges + i * given->ranges_step + clips->range_at, n_ranges);
+    if (!cdbm_are_same_biases(given))
         memcpy(room->biases + at * n_ranges, given->range_biases + i * given->biases_step + clips->range_at, n_ranges * sizeof(double));
     if (is_own && decision->standing == CDBM_IS_WIDENED)
         room->ranges[at * n_ranges + (size_t)move->to.range] = 1, room->biases[at * n_ranges + (size_t)move->to.range] = given->wide[i];
+}
+
+/* What so many characters ask of a database. */
+static inline cdbm_question cdbm_question_of(const cdbm_given *given, const cdbm_clips *clips, const cdbm_choosing *room, size_t n)
+{
+    cdbm_question asked;
+    memset(&asked, 0, sizeof asked);
+    asked.n_queries = n, asked.queries = room->queries, asked.within = (double)INFINITY, asked.continuing = clips->continuing;
+    asked.is_one_mask = cdbm_is_one_mask(given), asked.are_same_biases = cdbm_are_same_biases(given);
+    asked.ranges = asked.is_one_mask ? given->ranges + clips->range_at : room->ranges;
+    asked.range_biases = asked.are_same_biases ? given->range_biases + clips->range_at : room->biases;
+    asked.allowed = given->allowed + clips->kind_at, asked.playable = given->playable + clips->kind_at;
+    asked.kind_biases = given->kind_biases + clips->kind_at;
+    asked.flags = given->flags ? given->flags + clips->frame_at : NULL;
+    asked.frame_biases = given->frame_biases ? given->frame_biases + clips->frame_at : NULL;
+    asked.skips = room->skips, asked.skip_stops = room->skip_stops, asked.currents = room->currents;
+    return asked;
 }
 
 /* Search a database for all of some characters whom none before it has satisfied. 0 where there is too little room, -1 for a query that
@@ -697,7 +746,6 @@ static inline int cdbm_search_database(const cdbm_controller *controller, const 
 {
     const cdbm_clips *clips = &controller->databases[database];
     size_t n = 0, i, k, width = cdbm_width(controller), n_databases = controller->n_databases;
-    int is_one_mask = given->ranges_step == 0 && !given->wide, are_same = given->biases_step == 0 && !given->wide;
     cdbm_question asked;
     cdbm_hits hits;
     room->skip_stops[0] = 0;
@@ -705,19 +753,11 @@ static inline int cdbm_search_database(const cdbm_controller *controller, const 
         found[i * n_databases + database].frame = -2.0, found[i * n_databases + database].cost = (double)INFINITY;
         if (!clips->frames || decisions[i].cause == CDBM_NOT_DUE || room->stopped[i - start]) continue;
         if (!given->among[i * given->among_step + database]) continue;
-        cdbm_put_question(controller, given, i, after + i * width, &moves[i], &decisions[i], database, room, n, is_one_mask, are_same);
+        cdbm_put_question(controller, given, i, after + i * width, &moves[i], &decisions[i], database, room, n);
         room->numbers[n++] = i;
     }
     if (n == 0) return 1;
-    memset(&asked, 0, sizeof asked);
-    asked.n_queries = n, asked.queries = room->queries, asked.within = (double)INFINITY, asked.continuing = clips->continuing;
-    asked.ranges = is_one_mask ? given->ranges + clips->range_at : room->ranges, asked.is_one_mask = is_one_mask;
-    asked.range_biases = are_same ? given->range_biases + clips->range_at : room->biases, asked.are_same_biases = are_same;
-    asked.allowed = given->allowed + clips->kind_at, asked.playable = given->playable + clips->kind_at;
-    asked.kind_biases = given->kind_biases + clips->kind_at;
-    asked.flags = given->flags ? given->flags + clips->frame_at : NULL;
-    asked.frame_biases = given->frame_biases ? given->frame_biases + clips->frame_at : NULL;
-    asked.skips = room->skips, asked.skip_stops = room->skip_stops, asked.currents = room->currents;
+    asked = cdbm_question_of(given, clips, room, n);
     hits.totals = room->totals, hits.frames = room->frames, hits.ranges = room->found;
     if (!cdbm_search_frames(clips->frames, &asked, 0, n, &hits, left)) return 0;
     for (k = 0; k < n; k++) {
@@ -821,13 +861,96 @@ static inline void cdbm_jump(const cdbm_controller *controller, const cdbm_given
     decision->play = cdbm_play_of(given, i, clips, (size_t)decision->chosen[1]);
 }
 
-/* What it costs to play on, where that takes part in the search. */
-static inline void cdbm_compare(const cdbm_controller *controller, const cdbm_given *given, size_t i, const cdbm_moved *move,
-    cdbm_decision *decision, double *room)
+/* ---- variation */
+
+/* A number below n, each equally likely, by seed and turn alone: SplitMix64. */
+static inline size_t cdbm_drawn(const cdbm_state *state, size_t n)
+{
+    uint64_t z = (uint64_t)state->seed + ((uint64_t)state->n_drawn + 1) * 0x9E3779B97F4A7C15;
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EB;
+    z ^= z >> 31;
+    return (size_t)((z >> 32) * n >> 32);
+}
+
+/* Whether variation remembers the asset of a range. */
+static inline int cdbm_is_recent(const cdbm_controller *controller, const double *row, const cdbm_clips *clips, size_t range)
+{
+    const double *recent = cdbm_recent_of(controller, (double *)(uintptr_t)row);
+    size_t i;
+    for (i = 0; i < controller->n_recent; i++)
+        if (recent[i] == clips->keys[range]) return 1;
+    return 0;
+}
+
+static inline void cdbm_remember_asset(const cdbm_controller *controller, double *row, const cdbm_clips *clips, size_t range)
+{
+    double *recent = cdbm_recent_of(controller, row);
+    if (controller->n_recent == 0) return;
+    memmove(recent + 1, recent, (controller->n_recent - 1) * sizeof *recent);
+    recent[0] = clips->keys[range];
+}
+
+/* One of the best frames of ranges, -1 where a range has none: of assets that are not remembered, or of all where there are no others.
+ * Its range; n_ranges where there is no frame. */
+static inline size_t cdbm_pick_tie(const cdbm_controller *controller, double *row, const cdbm_clips *clips, const int64_t *frames)
+{
+    cdbm_state *state = (cdbm_state *)row;
+    size_t n_all = 0, n_fresh = 0, left, r;
+    for (r = 0; r < clips->n_ranges; r++)
+        if (frames[r] >= 0) n_all++, n_fresh += !cdbm_is_recent(controller, row, clips, r);
+    if (n_all == 0) return clips->n_ranges;
+    left = cdbm_drawn(state, n_fresh ? n_fresh : n_all);
+    state->n_drawn += 1.0;
+    for (r = 0; r < clips->n_ranges; r++)
+        if (frames[r] >= 0 && (n_fresh == 0 || !cdbm_is_recent(controller, row, clips, r)) && left-- == 0) break;
+    return r;
+}
+
+/* Exchange what was chosen for another frame that is about as good; to play on comes before all of them. 0 where there is too little
+ * room. */
+static inline int cdbm_vary(const cdbm_controller *controller, const cdbm_given *given, size_t i, double *after, const cdbm_moved *move,
+    cdbm_decision *decision, cdbm_room room)
+{
+    const cdbm_clips *clips;
+    double within = decision->chosen[3] + controller->vary_within;
+    int is_under = decision->is_under != 0.0;
+    cdbm_choosing own;
+    cdbm_question asked;
+    cdbm_hits hits;
+    size_t database, r;
+    if (decision->cause == CDBM_NOT_DUE || decision->winner < 0.0) return 1;
+    if ((!is_under || move->to.database == decision->winner) && decision->continuing_cost <= within) {
+        decision->chosen[0] = CDBM_GO_ON;
+        return 1;
+    }
+    database = (size_t)decision->winner, clips = &controller->databases[database];
+    if (!cdbm_take_choosing(controller, &own, 1, &room)) return 0;
+    hits.totals = (double *)cdbm_part(&room, clips->n_ranges * sizeof(double));
+    hits.frames = (int64_t *)cdbm_part(&room, clips->n_ranges * sizeof(int64_t)), hits.ranges = own.found;
+    if (!hits.totals || !hits.frames) return 0;
+    own.skip_stops[0] = 0;
+    cdbm_put_question(controller, given, i, after, move, decision, database, &own, 0);
+    asked = cdbm_question_of(given, clips, &own, 1);
+    asked.within = within, asked.is_each = 1;
+    if (!cdbm_search_frames(clips->frames, &asked, 0, 1, &hits, room)) return 0;
+    for (r = 0; is_under && r < clips->n_ranges; r++)
+        if (!(hits.totals[r] < clips->threshold)) hits.frames[r] = -1;
+    r = hits.ranges[0] == CDBM_REFUSED ? clips->n_ranges : cdbm_pick_tie(controller, after, clips, hits.frames);
+    if (r == clips->n_ranges) return 1;
+    decision->chosen[1] = (double)r, decision->chosen[2] = (double)hits.frames[r], decision->chosen[3] = hits.totals[r];
+    return 1;
+}
+
+/* What it costs to play on, where that takes part in the search; and what is to play in place of the best, where that varies. 0 where
+ * there is too little room; `numbers` has one for each feature. */
+static inline int cdbm_weigh(const cdbm_controller *controller, const cdbm_given *given, size_t i, double *after, const cdbm_moved *move,
+    cdbm_decision *decision, double *numbers, cdbm_room room)
 {
     int is_wide = decision->standing == CDBM_IS_WIDENED;
     if (decision->winner >= 0.0 && decision->current >= 0.0)
-        decision->continuing_cost = cdbm_continuing_cost(controller, given, i, &move->to, is_wide ? given->wide[i] : NAN, room);
+        decision->continuing_cost = cdbm_continuing_cost(controller, given, i, &move->to, is_wide ? given->wide[i] : NAN, numbers);
+    return !controller->varies || cdbm_vary(controller, given, i, after, move, decision, room);
 }
 
 /* Whether what plays was entered so lately that it plays on though something else costs a little less; not where it is to stand. */
@@ -857,6 +980,7 @@ static inline void cdbm_go_on(const cdbm_controller *controller, const cdbm_stat
         double span[2];
         span[0] = decision->playing.frame, span[1] = decision->playing.frame + 1.0;
         cdbm_remember(controller, after, (size_t)decision->playing.range, span);
+        cdbm_remember_asset(controller, after, &controller->databases[(size_t)decision->playing.database], (size_t)decision->playing.range);
         next->entered_s = next->time_s;
     }
     if (decision->held == CDBM_NOT_HELD || decision->held == CDBM_BY_HYSTERESIS) next->waiting_since_s = NAN;
@@ -864,7 +988,7 @@ static inline void cdbm_go_on(const cdbm_controller *controller, const cdbm_stat
     next->rate = decision->rate, next->play = decision->play;
 }
 
-/* The second half of an update: what plays now. `chosen` may have been changed for another frame that is about as good. */
+/* The second half of an update: what plays now. */
 static inline void cdbm_decide(const cdbm_controller *controller, const cdbm_given *given, size_t i, const double *before,
     const cdbm_moved *move, double *after, cdbm_decision *decision)
 {

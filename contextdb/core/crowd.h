@@ -5,6 +5,7 @@
  *   cdbm_crowd_size      how many there are of something
  *   cdbm_crowd_table, cdbm_crowd_live   a table of the bundle, and a character's facts for it: set them by cdb_set_number and the others
  *   cdbm_place_one, cdbm_steer_one      put one somewhere, with nothing played yet; and what its stick asks for
+ *   cdbm_seed_one        let chance decide otherwise for one
  *   cdbm_event_one       what is to happen, and in how many seconds
  *   cdbm_restore_one     put one where it stood
  *   cdbm_enter_one       play a one-off that a match node chooses for a target
@@ -77,6 +78,7 @@ static inline int cdbm_take_crowd(cdbm_crowd *crowd, size_t n, cdb_unknown unkno
     for (i = 0; i < n; i++) {
         cdbm_lay_out(player, &crowd->poses[i], of_poses + i * cdbm_pose_size(player));
         cdbm_begin(player, crowd->states + i * cdbm_state_width(player), 0.0, 0.0, 0.0);
+        cdbm_seed(player, crowd->states + i * cdbm_state_width(player), i);
         memset(&crowd->inputs[i], 0, sizeof crowd->inputs[i]);
         crowd->inputs[i].goal.facing = NAN, crowd->inputs[i].unknown = unknown, crowd->inputs[i].fault = &crowd->fault;
         crowd->inputs[i].facts = crowd->lists + i * n_tables;
@@ -159,12 +161,21 @@ CDB_API cdb_live *cdbm_crowd_live(const cdbm_crowd *crowd, size_t i, size_t tabl
     return i < crowd->n && table < crowd->player.n_tables ? crowd->lives[i * crowd->player.n_tables + table] : NULL;
 }
 
-/* Put a character somewhere, with nothing played yet. 0 where there is none of that number. */
+/* Put a character somewhere, with nothing played yet; chance goes by its number as a seed. 0 where there is none of that number. */
 CDB_API int cdbm_place_one(cdbm_crowd *crowd, size_t i, double x, double z, double heading)
 {
     if (i >= crowd->n) return 0;
     cdbm_begin(&crowd->player, crowd->states + i * cdbm_state_width(&crowd->player), x, z, heading);
+    cdbm_seed(&crowd->player, crowd->states + i * cdbm_state_width(&crowd->player), i);
     crowd->inputs[i].one_off = NULL;
+    return 1;
+}
+
+/* Let chance go by another seed for a character that was put in its place, see cdbm_seed. 0 where there is none of that number. */
+CDB_API int cdbm_seed_one(cdbm_crowd *crowd, size_t i, uint64_t seed)
+{
+    if (i >= crowd->n) return 0;
+    cdbm_seed(&crowd->player, crowd->states + i * cdbm_state_width(&crowd->player), seed);
     return 1;
 }
 

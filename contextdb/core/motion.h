@@ -6,6 +6,7 @@
 #include "search.h"
 #include "joint.h"
 #include "controller.h"
+#include "played.h"
 #include "follow.h"
 #include "walk.h"
 #include "tags.h"

@@ -145,8 +145,8 @@ static inline int cdbi_order(const cdbi_pick *pick, size_t depth, size_t row, si
     if (one == two) return 0;
     if (cdbi_place(a) != cdbi_place(b)) return cdbi_place(a) > cdbi_place(b) ? 1 : -1;
     if (!level->by_cost) return 0;
-    b = cdbi_cost(pick->table, pick->schema, pick->facts, pick->unknown, depth, row);
-    a = cdbi_cost(pick->table, pick->schema, pick->facts, pick->unknown, depth, other);
+    b = cdbi_cost(pick->table, pick->schema, pick->facts, pick->unknown, 0, depth, row);
+    a = cdbi_cost(pick->table, pick->schema, pick->facts, pick->unknown, 0, depth, other);
     return cdbi_place(a) == cdbi_place(b) ? 0 : cdbi_place(a) > cdbi_place(b) ? 1 : -1;
 }
 
@@ -281,7 +281,7 @@ static inline int64_t cdbi_pick_of_few(cdbi_pick *pick)
             if (level->keys && cdbi_rests(pick, level, row)) continue;
             n_parts++;
             if (n > 0 && rank < best) continue;
-            if (level->by_cost) cost = cdbi_place(cdbi_cost(table, pick->schema, pick->facts, pick->unknown, 0, row));
+            if (level->by_cost) cost = cdbi_place(cdbi_cost(table, pick->schema, pick->facts, pick->unknown, 0, 0, row));
             if (n > 0 && rank == best && cost > best_cost) continue;
             if (rank != best || cost != best_cost) n = 0;
             if (n == CDBI_FEW) return CDBI_TOO_MANY;

@@ -10,15 +10,15 @@ typedef struct cdbp_controller {
     int is_made;
 } cdbp_controller;
 
-/* One database: (frames, starts, stops, assets, looping, root or None, marks, root_weights, rate, threshold, bar, continuing, settle, permutations, pace, n_pace,
- * pace_s). */
+/* One database: (frames, starts, stops, assets, keys or None, looping, root or None, marks, root_weights, rate, threshold, bar, continuing, settle, permutations,
+ * pace, n_pace, pace_s). */
 static int cdbp_take_clips(cdbp_controller *own, PyObject *part, cdbm_clips *to, cdbp_arrays *a)
 {
-    PyObject *frames, *in[7];
+    PyObject *frames, *in[8];
     long long n_permutations, pace, n_pace;
     size_t s[3];
-    if (!PyArg_ParseTuple(part, "OOOOOOOOdddddLLLd", &frames, &in[0], &in[1], &in[2], &in[3], &in[4], &in[5], &in[6], &to->rate, &to->threshold,
-        &to->bar, &to->continuing, &to->settle, &n_permutations, &pace, &n_pace, &to->pace_s)) return -1;
+    if (!PyArg_ParseTuple(part, "OOOOOOOOOdddddLLLd", &frames, &in[0], &in[1], &in[2], &in[7], &in[3], &in[4], &in[5], &in[6], &to->rate,
+        &to->threshold, &to->bar, &to->continuing, &to->settle, &n_permutations, &pace, &n_pace, &to->pace_s)) return -1;
     to->range_at = own->n_ranges, to->kind_at = own->n_kinds, to->frame_at = own->n_frames;
     if (frames == Py_None) return 0;
     if (!cdbp_is_freed_by(Py_TYPE(frames), cdbp_frames_free) || !((cdbp_frames *)frames)->is_made) {
@@ -30,6 +30,7 @@ static int cdbp_take_clips(cdbp_controller *own, PyObject *part, cdbm_clips *to,
     if (!(to->starts = cdbp_int64s(a, in[0], s, 1, to->n_ranges, 0)) || !(to->stops = cdbp_int64s(a, in[1], s, 1, to->n_ranges, 0)))
         return -1;
     if (!(to->assets = cdbp_int64s(a, in[2], s, 1, to->n_ranges, 0))) return -1;
+    if (in[7] != Py_None && !(to->keys = cdbp_numbers(a, in[7], s, 1, to->n_ranges, 0, 0))) return -1;
     if (!(to->looping = (const uint8_t *)cdbp_shaped(a, in[3], 'b', 1, 0, s, 1, to->n_ranges, 0, 0))) return -1;
     if (in[4] != Py_None && !(to->root = (const float *)cdbp_shaped(a, in[4], 'f', 4, 0, s, 2, to->frames->n_frames, 3, 0))) return -1;
     if (!(to->marks = (const uint8_t *)cdbp_shaped(a, in[5], 'u', 1, 0, s, 1, CDBP_ANY, 0, 0))) return -1;
@@ -41,18 +42,19 @@ static int cdbp_take_clips(cdbp_controller *own, PyObject *part, cdbm_clips *to,
 }
 
 /* Controllers(databases, n_played, search_every_s, jump_threshold_s, history_s, min_rate, max_rate, grace_s, settle_s, asset_history_s,
- * until_natural) */
+ * until_natural, varies, vary_within, n_recent) */
 static int cdbp_controller_init(PyObject *self, PyObject *arguments, PyObject *named)
 {
     cdbp_controller *own = (cdbp_controller *)self;
     cdbm_controller *to = &own->controller;
     PyObject *parts;
-    long long n_played;
+    long long n_played, n_recent;
     Py_ssize_t n, i;
     int is_right = 1;
     (void)named;
-    if (own->parts || !PyArg_ParseTuple(arguments, "OLddddddddp", &parts, &n_played, &to->search_every_s, &to->jump_threshold_s,
-        &to->history_s, &to->min_rate, &to->max_rate, &to->grace_s, &to->settle_s, &to->asset_history_s, &to->until_natural)) {
+    if (own->parts || !PyArg_ParseTuple(arguments, "OLddddddddppdL", &parts, &n_played, &to->search_every_s, &to->jump_threshold_s,
+        &to->history_s, &to->min_rate, &to->max_rate, &to->grace_s, &to->settle_s, &to->asset_history_s, &to->until_natural,
+        &to->varies, &to->vary_within, &n_recent)) {
         if (!PyErr_Occurred()) PyErr_SetString(PyExc_TypeError, "Controllers are made once");
         return -1;
     }
@@ -65,11 +67,12 @@ static int cdbp_controller_init(PyObject *self, PyObject *arguments, PyObject *n
         PyErr_NoMemory();
         return -1;
     }
-    to->databases = own->databases, to->n_databases = own->n_arrays = (size_t)n, to->n_played = (size_t)n_played;
+    to->databases = own->databases, to->n_databases = own->n_arrays = (size_t)n, to->n_played = (size_t)n_played, to->n_recent = (size_t)n_recent;
     for (i = 0; i < n; i++)
         if (cdbp_take_clips(own, PyTuple_GetItem(parts, i), &own->databases[i], &own->arrays[i]) != 0) return -1;
-    for (i = 0; i < n; i++) is_right = is_right && (!to->databases[i].frames || cdbm_are_clips(&to->databases[i], to->n_features));
-    own->is_made = is_right && n_played >= 0;
+    for (i = 0; i < n; i++)
+        is_right = is_right && (!to->databases[i].frames || (cdbm_are_clips(&to->databases[i], to->n_features) && (!n_recent || to->databases[i].keys)));
+    own->is_made = is_right && n_played >= 0 && n_recent >= 0;
     if (!own->is_made) PyErr_SetString(PyExc_ValueError, "the parts of the databases do not go together");
     return own->is_made ? 0 : -1;
 }
@@ -89,11 +92,8 @@ static void cdbp_controller_free(PyObject *self)
 static int cdbp_are_rows(const cdbm_controller *controller, const double *rows, size_t n)
 {
     size_t i, width = cdbm_width(controller);
-    for (i = 0; i < n; i++) {
-        const cdbm_state *state = (const cdbm_state *)(rows + i * width);
-        if (!cdbm_is_playing(controller, &state->playing)) return 0;
-        if (!(state->n_played >= 0.0 && state->n_played <= (double)controller->n_played)) return 0;
-    }
+    for (i = 0; i < n; i++)
+        if (!cdbm_is_row(controller, rows + i * width)) return 0;
     return 1;
 }
 
@@ -233,7 +233,8 @@ static int cdbp_run_controller(const cdbm_controller *controller, const cdbp_upd
     if (parts & CDBP_CHOOSE) {
         int is_done = cdbm_choose(controller, &to->given, start, stop, to->after, to->moved, to->decisions, to->found, left);
         if (is_done != 1) return is_done;
-        for (i = start; i < stop; i++) cdbm_compare(controller, &to->given, i, &to->moved[i], &to->decisions[i], room);
+        for (i = start; i < stop; i++)
+            if (!cdbm_weigh(controller, &to->given, i, to->after + i * width, &to->moved[i], &to->decisions[i], room, left)) return 0;
     }
     for (i = start; parts & CDBP_DECIDE && i < stop; i++)
         cdbm_decide(controller, &to->given, i, to->before + i * width, &to->moved[i], to->after + i * width, &to->decisions[i]);

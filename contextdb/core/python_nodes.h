@@ -74,6 +74,55 @@ static int cdbp_two_motions(PyObject *const *in, Py_ssize_t n, double *numbers)
     return n == 6;
 }
 
+/* until_down_s(contacts, foot, is_looping, rate, at_s): see played.h. */
+static PyObject *cdbp_until_down_s(PyObject *module, PyObject *const *in, Py_ssize_t n)
+{
+    cdbp_arrays a;
+    const uint8_t *contacts;
+    double rate, at_s, until_s = -1.0;
+    int64_t foot;
+    size_t s[3];
+    (void)module;
+    a.n = 0;
+    if (n == 5 && (contacts = (const uint8_t *)cdbp_shaped(&a, in[0], 'b', 1, 0, s, 2, CDBP_ANY, CDBP_ANY, 0)) && cdbp_int_of(in[1], &foot)
+        && cdbp_float_of(in[3], &rate) && cdbp_float_of(in[4], &at_s) && s[0] > 0 && foot >= 0)
+        until_s = cdbm_until_down_s(contacts, s[0], s[1], (size_t)foot, in[2] == Py_True, rate, at_s);
+    cdbp_release(&a);
+    if (until_s >= 0.0) return PyFloat_FromDouble(until_s);
+    if (!PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "until_down_s takes the contacts of a clip, a foot and two numbers");
+    return NULL;
+}
+
+/* going(path, rate, at_s): how fast a clip goes, m/s, and turns, degrees a second. */
+static PyObject *cdbp_going(PyObject *module, PyObject *const *in, Py_ssize_t n)
+{
+    cdbp_arrays a;
+    const float *path;
+    double rate, at_s, speed, turn;
+    size_t s[3];
+    int is_done = 0;
+    (void)module;
+    a.n = 0;
+    if (n == 3 && (path = (const float *)cdbp_shaped(&a, in[0], 'f', 4, 0, s, 2, CDBP_ANY, 3, 0)) && cdbp_float_of(in[1], &rate)
+        && cdbp_float_of(in[2], &at_s) && s[0] > 0 && rate > 0.0) is_done = 1, cdbm_going(path, s[0], rate, at_s, &speed, &turn);
+    cdbp_release(&a);
+    if (is_done) return Py_BuildValue("dd", speed, turn);
+    if (!PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "going takes the path of a clip and two numbers");
+    return NULL;
+}
+
+/* phase(n_frames, rate, at_s): the share of a clip that has played. */
+static PyObject *cdbp_phase(PyObject *module, PyObject *const *in, Py_ssize_t n)
+{
+    int64_t n_frames;
+    double rate, at_s;
+    (void)module;
+    if (n == 3 && cdbp_int_of(in[0], &n_frames) && cdbp_float_of(in[1], &rate) && cdbp_float_of(in[2], &at_s) && n_frames > 0)
+        return PyFloat_FromDouble(cdbm_phase((size_t)n_frames, rate, at_s));
+    if (!PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "phase takes three numbers");
+    return NULL;
+}
+
 /* motion_then(left, ahead, turn, left, ahead, turn): a movement over the ground, and another one after it. */
 static PyObject *cdbp_motion_then(PyObject *module, PyObject *const *in, Py_ssize_t n)
 {
@@ -364,5 +413,8 @@ static PyObject *cdbp_begin_roles(PyObject *module, PyObject *const *in, Py_ssiz
     {"warp", CDBP_CALL(cdbp_warp), METH_FASTCALL, "Write a path that is warped to a target."}, \
     {"row_at", CDBP_CALL(cdbp_row_at), METH_FASTCALL, "Write the row between two times."}, \
     {"aim", CDBP_CALL(cdbp_aim), METH_FASTCALL, "Write what a target adds to the costs of frames."}, \
+    {"until_down_s", CDBP_CALL(cdbp_until_down_s), METH_FASTCALL, "Seconds until a foot is down."}, \
+    {"going", CDBP_CALL(cdbp_going), METH_FASTCALL, "How fast a clip goes and turns."}, \
+    {"phase", CDBP_CALL(cdbp_phase), METH_FASTCALL, "The share of a clip that has played."}, \
     {"motion_then", CDBP_CALL(cdbp_motion_then), METH_FASTCALL, "A movement, and another one after it."}, \
     {"motion_from", CDBP_CALL(cdbp_motion_from), METH_FASTCALL, "The movement from one place to another."},

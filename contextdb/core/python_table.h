@@ -604,7 +604,7 @@ static PyObject *cdbp_ask_straight(const cdbp_table *own, PyObject *context, voi
         answer = cdbp_new_answer(own->answers, own->shared, own->table.n_words);
         if (answer) cdbp_and(answer->words, own->table.enabled, masks, own->n_groups, own->table.n_words);
         if (answer && own->has_others)
-            cdbi_and_others(answer->words, &own->table, own->columns, &own->schema, frame.facts, CDB_UNKNOWN_ERROR);
+            cdbi_and_others(answer->words, &own->table, own->columns, &own->schema, frame.facts, CDB_UNKNOWN_ERROR, 0);
     }
     cdbp_let_go(&frame);
     return (PyObject *)answer;
@@ -693,7 +693,7 @@ static void cdbp_add_costs(const cdbp_table *own, size_t at, const cdb_fact *fac
         uint64_t failing = ~(mask ? mask[word] : cdbi_accepted(&soft->column, condition, fact, unknown, word, n_words));
         for (; failing; failing &= failing - 1) {
             row = word * 64 + cdbi_first_bit(failing);
-            if (row < n) costs[row] = cdbi_sum(costs[row], cdbi_grown(soft, condition, fact, row));
+            if (row < n) costs[row] = cdbi_sum(costs[row], cdbi_grown(soft, condition, fact, 0, row));
         }
     }
 }

@@ -52,6 +52,26 @@ static inline int cdbi_is_in(const cdb_condition *condition, const cdbi_part *pa
     return 1;
 }
 
+/* What is within the hysteresis of a column of a fact, which is there: spans with both ends inside, one or, of angles, two. Without a
+ * hysteresis the fact alone. */
+static inline size_t cdbi_near(const cdb_column *column, const cdb_condition *condition, const cdb_fact *fact, double spans[2][2])
+{
+    double number = cdbi_number(condition, fact), reach = cdbi_negative(column->hysteresis), turn, part, rounded;
+    spans[0][0] = cdbi_sum(number, reach), spans[0][1] = cdbi_sum(number, column->hysteresis);
+    if (condition->type != CDB_ANGLE || !cdbi_is_less(0.0, column->hysteresis)) return 1;
+    turn = cdbi_sum(spans[0][1], cdbi_negative(spans[0][0]));
+    part = cdbi_sum(turn, cdbi_negative(spans[0][1])); /* what the difference was rounded by */
+    rounded = cdbi_sum(cdbi_sum(spans[0][1], cdbi_negative(cdbi_sum(turn, cdbi_negative(part)))), cdbi_negative(cdbi_sum(spans[0][0], part)));
+    if (cdbi_is_less(360.0, turn) || (!cdbi_is_less(turn, 360.0) && !cdbi_is_less(rounded, 0.0))) {
+        spans[0][0] = -180.0, spans[0][1] = 179.99999999999997;
+        return 1;
+    }
+    spans[0][0] = cdbi_wrapped(spans[0][0]), spans[0][1] = cdbi_wrapped(spans[0][1]);
+    if (!cdbi_is_less(spans[0][1], spans[0][0])) return 1;
+    spans[1][0] = -180.0, spans[1][1] = spans[0][1], spans[0][1] = 179.99999999999997;
+    return 2;
+}
+
 /* The answer of a slot of a tags column: does the fact have its tag, or does its cell, which begins with "not", hold? */
 static inline size_t cdbi_answer(const cdb_column *column, const cdb_condition *condition, size_t slot, const cdb_fact *fact)
 {
@@ -134,6 +154,31 @@ CDBI_HOT void cdbi_and_wide(uint64_t *rows, const cdb_column *column, double num
     cdbi_and_wide_class(rows, column, cdbi_class(column, number), from, to, n_words);
 }
 
+/* Some words of rows &= those whose cells of a column of numbers accept anything within its hysteresis of a fact; rows[0] is word
+ * `from`. */
+static inline void cdbi_and_near(uint64_t *rows, const cdb_column *column, const cdb_condition *condition, const cdb_fact *fact, size_t from,
+    size_t to, size_t n_words)
+{
+    double spans[2][2];
+    size_t n = cdbi_near(column, condition, fact, spans), at, i, k, last;
+    for (at = from; at < to; at++) {
+        uint64_t all = rows[at - from], some = 0;
+        for (i = 0; i < n; i++)
+            for (k = cdbi_class(column, spans[i][0]), last = cdbi_class(column, spans[i][1]); k <= last && some != all; k++) {
+                uint64_t own = all;
+                if (column->kind == CDBI_WIDE) cdbi_and_wide_class(&own, column, k, at, at + 1, n_words);
+                else own &= column->masks[k * n_words + at];
+                some |= own;
+            }
+        rows[at - from] = some;
+    }
+}
+
+static inline int cdbi_is_widened(const cdb_column *column, int is_wide)
+{
+    return is_wide && cdbi_is_less(0.0, column->hysteresis);
+}
+
 static inline void cdbi_and_slots(uint64_t *rows, const cdb_column *column, const cdb_condition *condition, const cdb_fact *fact,
     size_t n_words)
 {
@@ -145,27 +190,29 @@ static inline void cdbi_and_slots(uint64_t *rows, const cdb_column *column, cons
     }
 }
 
-/* Wide columns and columns of tags, for the rows that the others left. */
+/* Wide columns, columns of tags, and widened ones, for the rows that the others left. */
 static inline void cdbi_and_others(uint64_t *rows, const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
-    const cdb_fact *facts, cdb_unknown unknown)
+    const cdb_fact *facts, cdb_unknown unknown, int is_wide)
 {
     size_t i;
     for (i = 0; i < schema->n_conditions; i++) {
-        int is_missing;
-        if (columns[i].kind != CDBI_WIDE && columns[i].kind != CDBI_SLOTS) continue;
+        int is_missing, is_widened = cdbi_is_widened(&columns[i], is_wide);
+        if (columns[i].kind != CDBI_WIDE && columns[i].kind != CDBI_SLOTS && !(columns[i].kind == CDBI_FLAT && is_widened)) continue;
         is_missing = cdbi_is_missing(&schema->conditions[i], &facts[i]);
         if (is_missing && unknown == CDB_UNKNOWN_ANY) continue;
         if (columns[i].kind == CDBI_SLOTS) cdbi_and_slots(rows, &columns[i], &schema->conditions[i], &facts[i], table->n_words);
+        else if (is_missing && columns[i].kind == CDBI_FLAT) continue; /* its mask was one of the others */
         else if (is_missing) cdbi_and(rows, rows, &columns[i].any_mask, 1, table->n_words);
+        else if (is_widened) cdbi_and_near(rows, &columns[i], &schema->conditions[i], &facts[i], 0, table->n_words, table->n_words);
         else cdbi_and_wide(rows, &columns[i], cdbi_number(&schema->conditions[i], &facts[i]), 0, table->n_words, table->n_words);
     }
 }
 
 /* The rows whose every cell accepts its fact and whose rule holds, one bit a row, in `rows`, which has room for `room` words; words
  * behind those of the table become 0. Facts are in the order of the schema; those of derived conditions are computed here, into
- * `own`. On a fault no row is valid. */
-static inline cdb_status cdbi_query(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, const cdb_fact *facts,
-    cdb_fact *own, cdb_unknown unknown, uint64_t *rows, size_t room, cdb_fault *fault)
+ * `own`. Where `is_wide`, cells are widened by the hysteresis of their conditions, but rules are not. On a fault no row is valid. */
+static inline cdb_status cdbi_query_as(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, const cdb_fact *facts,
+    cdb_fact *own, cdb_unknown unknown, int is_wide, uint64_t *rows, size_t room, cdb_fault *fault)
 {
     const uint64_t *masks[CDBI_MASKS], *mask, *from = table->enabled;
     size_t n = 0, i, n_words = table->n_words;
@@ -182,7 +229,8 @@ static inline cdb_status cdbi_query(const cdb_table *table, const cdb_column *co
         is_missing = cdbi_is_missing(&schema->conditions[i], &facts[i]);
         if (is_missing && unknown == CDB_UNKNOWN_ANY) continue;
         if (is_missing ? unknown == CDB_UNKNOWN_ERROR : cdbi_is_wrong(&schema->conditions[i], &facts[i])) break;
-        mask = cdbi_mask(&columns[i], &schema->conditions[i], &facts[i], is_missing, n_words);
+        mask = !is_missing && cdbi_is_widened(&columns[i], is_wide) ? NULL
+            : cdbi_mask(&columns[i], &schema->conditions[i], &facts[i], is_missing, n_words);
         if (!mask) has_others = 1;
         else masks[n++] = mask;
         if (n == CDBI_MASKS) {
@@ -193,7 +241,7 @@ static inline cdb_status cdbi_query(const cdb_table *table, const cdb_column *co
     }
     if (i == schema->n_conditions) {
         cdbi_and(rows, from, masks, n, n_words);
-        if (has_others) cdbi_and_others(rows, table, columns, schema, facts, unknown);
+        if (has_others) cdbi_and_others(rows, table, columns, schema, facts, unknown, is_wide);
         status = table->has_programs ? cdbi_and_rules(rows, table, schema, facts, unknown, fault) : CDB_OK;
         if (status == CDB_OK) return cdbi_fault(fault, CDB_OK, "", -1, "");
     } else if (cdbi_is_missing(&schema->conditions[i], &facts[i])) status = cdbi_missing_fault(fault, table, schema, facts, i);
@@ -202,7 +250,14 @@ static inline cdb_status cdbi_query(const cdb_table *table, const cdb_column *co
     return status;
 }
 
-/* The valid rows for some facts, which stay as they are: those of derived conditions are passed over. See cdbi_query. */
+/* See cdbi_query_as. */
+static inline cdb_status cdbi_query(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, const cdb_fact *facts,
+    cdb_fact *own, cdb_unknown unknown, uint64_t *rows, size_t room, cdb_fault *fault)
+{
+    return cdbi_query_as(table, columns, schema, facts, own, unknown, 0, rows, room, fault);
+}
+
+/* The valid rows for some facts, which stay as they are: those of derived conditions are passed over. See cdbi_query_as. */
 CDB_API cdb_status cdb_query(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, const cdb_fact *facts,
     cdb_unknown unknown, uint64_t *rows, size_t room, cdb_fault *fault)
 {
@@ -210,7 +265,16 @@ CDB_API cdb_status cdb_query(const cdb_table *table, const cdb_column *columns, 
     return cdbi_query(table, columns, schema, facts, own, unknown, rows, room, fault);
 }
 
-/* The same for `n` contexts, whose facts stand one after another, as do their rows, n_words for each. Of a context with a fault no
+/* The same where what plays already is concerned: a row is valid too where its facts are within the hysteresis of their conditions beyond
+ * its cells. */
+CDB_API cdb_status cdb_query_widened(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact *facts, cdb_unknown unknown, uint64_t *rows, size_t room, cdb_fault *fault)
+{
+    cdb_fact own[CDB_MOST_FACTS];
+    return cdbi_query_as(table, columns, schema, facts, own, unknown, 1, rows, room, fault);
+}
+
+/* The same as cdb_query for `n` contexts, whose facts stand one after another, as do their rows, n_words for each. Of a context with a fault no
  * row is valid, the others are answered; gives the first fault, with the number of its context in *context. */
 CDB_API cdb_status cdb_query_many(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
     const cdb_fact *facts, size_t n, cdb_unknown unknown, uint64_t *rows, size_t *context, cdb_fault *fault)

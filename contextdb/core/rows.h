@@ -41,47 +41,54 @@ static inline cdb_status cdbi_ready(const cdb_table *table, const cdb_column *co
     return status;
 }
 
-/* How far a number is from a span. */
-static inline double cdbi_gap(double number, const double *span)
+/* How far numbers from `low` to `high` are from a span. */
+static inline double cdbi_gap(double low, double high, const double *span)
 {
-    return span[0] > number ? span[0] - number : number > span[1] ? number - span[1] : 0.0;
+    return span[0] > high ? span[0] - high : low > span[1] ? low - span[1] : 0.0;
 }
 
-/* What a soft cell that does not accept its fact costs: its penalty, or so many as the fact is away from it. */
-static inline double cdbi_grown(const cdbi_soft *soft, const cdb_condition *condition, const cdb_fact *fact, size_t row)
+/* What a soft cell that does not accept its fact, or what is near it, costs: its penalty, or so many as that is away from it. */
+static inline double cdbi_grown(const cdbi_soft *soft, const cdb_condition *condition, const cdb_fact *fact, int is_wide, size_t row)
 {
-    double penalty = soft->penalties[row], least, number, gap;
+    double penalty = soft->penalties[row], least, gap, spans[2][2];
+    size_t n = 1, i;
     int64_t k;
     int turn, is_circular = condition->type == CDB_ANGLE;
     size_t cell = soft->per ? (size_t)soft->which[row] : 0;
     if (!soft->per || !(soft->per[cell] == soft->per[cell]) || cdbi_is_missing(condition, fact)) return penalty;
     if (!(penalty > 0.0)) return 0.0;
-    number = cdbi_number(condition, fact);
-    least = cdbi_gap(number, soft->ends + 2 * soft->starts[cell]);
-    for (k = soft->starts[cell]; k < soft->starts[cell + 1]; k++)
-        for (turn = is_circular ? -1 : 0; turn <= is_circular; turn++) {
-            gap = cdbi_gap(number + 360.0 * (double)turn, soft->ends + 2 * k);
-            if (gap < least) least = gap;
-        }
+    spans[0][0] = spans[0][1] = cdbi_number(condition, fact);
+    if (cdbi_is_widened(&soft->column, is_wide)) n = cdbi_near(&soft->column, condition, fact, spans);
+    least = cdbi_gap(spans[0][0], spans[0][1], soft->ends + 2 * soft->starts[cell]);
+    for (i = 0; i < n; i++)
+        for (k = soft->starts[cell]; k < soft->starts[cell + 1]; k++)
+            for (turn = is_circular ? -1 : 0; turn <= is_circular; turn++) {
+                gap = cdbi_gap(spans[i][0] + 360.0 * (double)turn, spans[i][1] + 360.0 * (double)turn, soft->ends + 2 * k);
+                if (gap < least) least = gap;
+            }
     return penalty * (least / soft->per[cell]);
 }
 
 /* What the soft cells of one row cost at one depth of tables inside tables. */
-static inline double cdbi_cost(const cdb_table *table, const cdb_schema *schema, const cdb_fact *facts, cdb_unknown unknown,
+static inline double cdbi_cost(const cdb_table *table, const cdb_schema *schema, const cdb_fact *facts, cdb_unknown unknown, int is_wide,
     size_t depth, size_t row)
 {
     size_t i, at = depth * table->n_rows + row, n_words = (table->n_depths * table->n_rows + 63) / 64;
     double cost = 0.0;
-    for (i = 0; table->soft && i < schema->n_conditions; i++)
-        if (table->soft[i].column.kind != 0
-            && !cdbi_accepts(&table->soft[i].column, &schema->conditions[i], &facts[i], unknown, at, n_words))
-            cost = cdbi_sum(cost, cdbi_grown(&table->soft[i], &schema->conditions[i], &facts[i], at));
+    for (i = 0; table->soft && i < schema->n_conditions; i++) {
+        const cdb_column *column = &table->soft[i].column;
+        uint64_t bits = ~(uint64_t)0;
+        if (column->kind == 0) continue;
+        if (!cdbi_is_widened(column, is_wide) || cdbi_is_missing(&schema->conditions[i], &facts[i]))
+            bits = cdbi_accepted(column, &schema->conditions[i], &facts[i], unknown, at / 64, n_words);
+        else cdbi_and_near(&bits, column, &schema->conditions[i], &facts[i], at / 64, at / 64 + 1, n_words);
+        if (!(bits >> at % 64 & 1)) cost = cdbi_sum(cost, cdbi_grown(&table->soft[i], &schema->conditions[i], &facts[i], is_wide, at));
+    }
     return cost;
 }
 
-/* What the soft cells of every row that do not accept their facts cost: `penalties` has room for so many numbers. */
-CDB_API cdb_status cdb_penalties(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
-    const cdb_fact *facts, cdb_unknown unknown, double *penalties, size_t room, cdb_fault *fault)
+static inline cdb_status cdbi_penalties(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact *facts, cdb_unknown unknown, int is_wide, double *penalties, size_t room, cdb_fault *fault)
 {
     cdb_fact own[CDB_MOST_FACTS];
     size_t row, depth;
@@ -93,8 +100,22 @@ CDB_API cdb_status cdb_penalties(const cdb_table *table, const cdb_column *colum
     if (status != CDB_OK) return status;
     for (row = 0; table->soft && row < table->n_rows; row++)
         for (depth = 0; depth < table->n_depths; depth++)
-            penalties[row] = cdbi_sum(penalties[row], cdbi_cost(table, schema, facts, unknown, depth, row));
+            penalties[row] = cdbi_sum(penalties[row], cdbi_cost(table, schema, facts, unknown, is_wide, depth, row));
     return cdbi_fault(fault, CDB_OK, "", -1, "");
+}
+
+/* What the soft cells of every row that do not accept their facts cost: `penalties` has room for so many numbers. */
+CDB_API cdb_status cdb_penalties(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact *facts, cdb_unknown unknown, double *penalties, size_t room, cdb_fault *fault)
+{
+    return cdbi_penalties(table, columns, schema, facts, unknown, 0, penalties, room, fault);
+}
+
+/* The same for cdb_query_widened. */
+CDB_API cdb_status cdb_penalties_widened(const cdb_table *table, const cdb_column *columns, const cdb_schema *schema,
+    const cdb_fact *facts, cdb_unknown unknown, double *penalties, size_t room, cdb_fault *fault)
+{
+    return cdbi_penalties(table, columns, schema, facts, unknown, 1, penalties, room, fault);
 }
 
 #define CDB_RULE (-1)               /* not a cell fails but the row's rule */

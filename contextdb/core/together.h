@@ -141,7 +141,7 @@ static inline void cdbm_soft_costs(const cdb_any *any, const cdb_fact *facts, cd
             for (depth = 0; depth < table->n_depths; depth++) {
                 size_t at = depth * table->n_rows + row;
                 if (!cdbi_accepts(&table->soft[i].column, &schema->conditions[i], &facts[i], unknown, at, n_words))
-                    own += cdbi_grown(&table->soft[i], &schema->conditions[i], &facts[i], at);
+                    own += cdbi_grown(&table->soft[i], &schema->conditions[i], &facts[i], 0, at);
             }
             costs[row] += own;
         }

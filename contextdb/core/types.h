@@ -203,6 +203,7 @@ typedef struct cdb_column {
     uint32_t *classes;              /* the class of each of these values */
     cdbi_slot *negated;             /* the slots behind those of single tags */
     size_t n_negated;
+    double hysteresis;              /* how far beyond its cells a fact may be for a row that plays already; 0: not at all */
 } cdb_column;
 
 #define CDBI_PROGRAM_PARTS 0xFFU

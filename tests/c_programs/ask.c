@@ -183,18 +183,22 @@ static void read_outputs(FILE *out, const cdb_table *table, const cdb_schema *sc
         }
 }
 
-/* More of a context: what soft cells cost, what a character picks, and for each row why it is not valid, a bit for each condition,
+/* More of a context: what soft cells cost, what plays on and what that costs, what a character picks, and for each row why it is not valid, a bit for each condition,
  * bit 62 for its rule, bit 61 where it is disabled. */
 static void more(FILE *out, const cdb_table *table, const cdb_column *columns, const cdb_schema *schema, cdb_fact *facts,
     cdb_unknown unknown, double time_s, cdb_picker *picker)
 {
-    uint64_t *rows = (uint64_t *)malloc(table->n_words * 8 + 8);
+    uint64_t *rows = (uint64_t *)malloc(table->n_words * 8 + 8), *widened = (uint64_t *)malloc(table->n_words * 8 + 8);
     double *penalties = (double *)malloc(table->n_rows * 8 + 8);
     cdb_status status = cdb_query(table, columns, schema, facts, unknown, rows, table->n_words, NULL);
     cdb_fault fault;
     int64_t row, picked = -1;
     put(out, (int64_t)table->n_rows);
     put(out, (int64_t)cdb_penalties(table, columns, schema, facts, unknown, penalties, table->n_rows, &fault));
+    fwrite(penalties, 8, table->n_rows, out);
+    put(out, (int64_t)cdb_query_widened(table, columns, schema, facts, unknown, widened, table->n_words, &fault));
+    fwrite(widened, 8, table->n_words, out);
+    put(out, (int64_t)cdb_penalties_widened(table, columns, schema, facts, unknown, penalties, table->n_rows, &fault));
     fwrite(penalties, 8, table->n_rows, out);
     if (status == CDB_OK) {
         cdb_rest rests[64];
@@ -218,6 +222,7 @@ static void more(FILE *out, const cdb_table *table, const cdb_column *columns, c
         put(out, status == CDB_OK ? (int64_t)bits : -1);
     }
     free(rows);
+    free(widened);
     free(penalties);
 }
 

@@ -380,7 +380,7 @@ static void give_back(memory *own)
 
 static void play(const cdbm_player *player, const char *from, const char *to)
 {
-    size_t size, n;
+    size_t size, n, i;
     char *input = read_all(from, &size);
     FILE *out = fopen(to, "wb");
     int64_t n_ticks, tick;
@@ -388,6 +388,7 @@ static void play(const cdbm_player *player, const char *from, const char *to)
     at = input;
     n = (size_t)*(const int64_t *)take(8, 1), n_ticks = *(const int64_t *)take(8, 1);
     own = taken(player, n), copies = taken(player, n);
+    for (i = 0; i < n; i++) cdbm_seed(player, own.states + i * cdbm_state_width(player), *(const uint64_t *)take(8, 1));
     if (!out || !cdbm_has_digest(&player->bundle)) exit(6);
     for (tick = 0; tick < n_ticks; tick++) update(player, n, &own, &copies, out);
     fclose(out);

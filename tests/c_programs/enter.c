@@ -17,6 +17,8 @@ int main(int n_words, char **words)
     cdbm_one_off one;
     double x, z, cost;
     if (!crowd) return puts(why), 1;
+    if (state[cdbm_walk_width(&crowd->player.ways) + 19] != 1.0 || cdbm_seed_one(crowd, 2, 7) || !cdbm_seed_one(crowd, 1, 7)) return 8;
+    if (state[cdbm_walk_width(&crowd->player.ways) + 19] != 7.0) return 9;
     cdbm_steer_one(crowd, 1, 0.0, 1.3, NAN);
     for (i = 0; i < 30; i++)
         if (cdbm_update_crowd(crowd, 1.0 / 30.0, NULL)) return 2;

@@ -24,7 +24,7 @@ from contextdb import motion
 from contextdb.commands.compile_command import c_motion_header
 from contextdb.commands.motion_build_command import file_of
 from contextdb.compiled.c_header import c_header_of
-from contextdb.core import direction_of
+from contextdb.motion.characters.facts import Moment
 from contextdb.motion.made.game import JOINT_RECIPES, JOINT_ROLES, make_joint_clip
 from contextdb.motion.markup.markup import Markup
 from contextdb.motion.markup.tag_filter import covers
@@ -75,11 +75,25 @@ CAPTURED_MARKS = Markup.parse(
 )
 CAPTURED_GAITS = [{"run": "Run", "dash": "Run"}.get(name.split("_")[0], "Idle Walk") for name in CAPTURED]
 CAPTURED_COLUMNS = {"Asset Name": list(CAPTURED), "gait": CAPTURED_GAITS, "direction": ["Any"] * len(CAPTURED)}
-CONDITIONS = {"gait": {"type": "enum", "values": ["Idle", "Walk", "Run"]}, "direction": {"type": "angle"}}
+CONDITIONS = {"gait": {"type": "enum", "values": ["Idle", "Walk", "Run"]}, "direction": {"type": "angle", "hysteresis": 100.0}}
+OF_PLAYED = {
+    "LeftFoot.Down": {"type": "bool"},
+    "RightFoot.UntilDown_s": {"type": "number", "unit": "s"},
+    "Playing.Speed": {"type": "number", "unit": "m/s", "hysteresis": 0.4},
+    "Playing.Turn": {"type": "number"},
+    "Playing.Phase": {"type": "number", "hysteresis": 0.15},
+    "Playing.Tag.hit": {"type": "bool"},
+}
 COLUMNS = {
     "Asset Name": list(NAMES),
     "gait": ["Idle", "Walk", "Walk", "Run", "Walk", "Idle Walk"],
-    "direction": ["Any", "-70..70", "20..180", "Any", "Any", "Any"],
+    "direction": ["Any", "-40..40", "20..180", "-40..40", "Any", "Any"],
+    "LeftFoot.Down": ["Any", "Any", "False ~0.4", "True ~0.3", "Any", "Any"],
+    "RightFoot.UntilDown_s": ["Any", "<0.2 ~0.5", "Any", "Any", ">=0.1 ~0.2", "Any"],
+    "Playing.Speed": ["Any", "1..9 ~0.3/2", "Any", "<2.5 ~0.1/1", "Any", "Any"],
+    "Playing.Turn": ["-5..5 ~0.2/20", "Any", "Any", "Any", "Any", "-20..20 ~0.1/9"],
+    "Playing.Phase": ["Any", "<0.6", ">0.3 ~0.3/2", "<0.6", "<0.8", "Any"],
+    "Playing.Tag.hit": ["Any", "Any", "Any", "Any", "Any", "False"],
     "play_rate": ["", "0.9..1.2", "", "", "1.1", "1.3..1.5"],
     "start_s": ["", "", "0.4", "", "", ""],
     "blend_s": ["", "", "", "0.2", "", "0.1"],
@@ -107,7 +121,7 @@ def table(is_captured=False):
     return (
         cdb.Table.from_columns(CAPTURED_COLUMNS, CONDITIONS)
         if is_captured
-        else cdb.Table.from_columns(COLUMNS, CONDITIONS, {"outputs": OUTPUTS})
+        else cdb.Table.from_columns(COLUMNS, {**CONDITIONS, **OF_PLAYED}, {"outputs": OUTPUTS})
     ).compile()
 
 
@@ -196,6 +210,7 @@ def drawn(rng, is_captured):
     settings = motion.ControllerSettings(
         search_every_s=rng.choice([0.0, 0.1, 0.3]), history_s=rng.choice([0.0, 0.5]), until_natural=rng.random() < 0.3,
         grace_s=rng.choice([0.0, 0.3]), asset_history_s=rng.choice([0.0, 1.5]),
+        variation=rng.choice([None, motion.Variation(0.3, 0), motion.Variation(1.0, 2)]),
     )  # fmt: skip
     output = motion.PoseSettings(root=root, foot_lock=rng.random() < 0.7, path_alignment=rng.random() < 0.5)
     return motion.Controller(motion.Selector(entries), settings), schema, banks, output
@@ -224,7 +239,8 @@ def entered(rng, one, stick, gait, nodes):
     name = rng.choice(list(nodes))
     node, turn = nodes[name], rng.choice([None, rng.uniform(-4.0, 4.0)])
     target = motion.Target(rng.uniform(-2.0, 2.0), rng.uniform(-1.0, 4.0), turn)
-    facts = {"gait": gait, "direction": direction_of(*stick, one.body.heading)}
+    moment = Moment(0.0, stick, None, one.body, one.playing, one._played())
+    facts = {"gait": gait} | {fact: of(moment) for fact, of in one.asked_facts.items()}
     options, numbers = options_for(rng, node.database)
     stitched = (rng.randrange(node.database.n_frames), rng.choice([1.0, 8.0, 60.0])) if rng.random() < 0.4 else (-1, 0.0)
     valid = one.tables.query(facts)
@@ -301,6 +317,10 @@ def met(rng, members, free, searchers):
     return once, given, struct.pack("6d", hit.range, hit.frame, row, hit.cost, *cast)
 
 
+def seeded(controller, seed):
+    return motion.Controller(controller.selector, controller.settings, rng=seed)
+
+
 def session(rng, n_ticks, is_captured=False):
     """A bundle, what characters are given in it, and what Python makes of that."""
     controller, schema, banks, output = drawn(rng, is_captured)
@@ -315,13 +335,15 @@ def session(rng, n_ticks, is_captured=False):
     played = Played(controller, schema, banks, output, {name: node.ends for name, node in nodes.items()})
     banks = moving_alike(banks)
     table_of = {"turns": "moves", "all": "moves", "tired": "meetings", "greetings": "meetings"}
+    n = rng.randint(1, 4)
+    seeds = [rng.randrange(1 << rng.choice([1, 53])) for _ in range(n)]
     bundle = bundle_of({"player": played}, table_of, tables, searchers)
-    n, ground = rng.randint(1, 4), rng.choice([None, slope, stairs])
+    ground = rng.choice([None, slope, stairs])
     members = [
-        motion.Character(controller.copy(), schema, table(is_captured), motion.PoseStream(banks, output), ground=ground)
-        for _ in range(n)
+        motion.Character(seeded(controller, seed), schema, table(is_captured), motion.PoseStream(banks, output), ground=ground)
+        for seed in seeds
     ]
-    crowd, given, expected = motion.Crowd(members), [struct.pack("qq", n, n_ticks)], []
+    crowd, given, expected = motion.Crowd(members), [struct.pack("qq", n, n_ticks), struct.pack(f"{n}q", *seeds)], []
     sticks, facings, events, once = [(0.0, 0.0)] * n, [math.nan] * n, [None] * n, [None] * n
     for tick in range(n_ticks):
         dt = rng.choice([1 / 30, 1 / 30, 1 / 60, 1 / 144]) if tick else 0.0
@@ -393,7 +415,7 @@ def test_characters_in_c_are_those_of_python_to_the_bit(seed, programs, tmp_path
 
 
 def test_a_damaged_bundle_is_refused_or_plays_and_never_reads_outside(programs, tmp_path: Path):
-    bundle, *_ = session(random.Random(1), 1)
+    bundle, *_ = session(random.Random(2), 1)  # with variation
     (tmp_path / "bundle").write_bytes(bundle)
     assert all(0 < int(ran(program, tmp_path / "bundle", str(N_DAMAGED))) < N_DAMAGED for program in programs)
 

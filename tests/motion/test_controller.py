@@ -9,7 +9,7 @@ import pytest
 from lines import DT, RATE, line
 from made_once import make_clip
 
-from contextdb.errors import MotionError, QueryError
+from contextdb.errors import QueryError
 from contextdb.motion import Entry, FeatureSchema, MotionDatabase, Selector, query_from, steady_path, with_path
 from contextdb.motion.answers import NamedAssets
 from contextdb.motion.markup.left_out import LeftOut
@@ -240,11 +240,6 @@ def test_variation_keeps_to_what_is_under_the_threshold_that_let_its_database_wi
     for seed in range(8):
         one = Controller(selector, ControllerSettings(**EVERY, variation=Variation(0.2)), rng=random.Random(seed))
         assert at(one.update(DT, [0.0])) == ("p", 0.0)
-
-
-def test_variation_without_a_generator_is_refused():
-    with pytest.raises(MotionError, match=r"the settings request variation, but there is no generator\. Accepted: rng="):
-        controller(line(p=[0.0]), variation=Variation(0.1))
 
 
 # ---- state

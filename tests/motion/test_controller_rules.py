@@ -14,6 +14,9 @@ from contextdb.motion.markup.marks import Mark
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.decision import Action
+from contextdb.motion.selection.variation import Variation
+
+SEED = 5
 
 
 @st.composite
@@ -38,6 +41,7 @@ def scenes(draw):
     rules["cost_bar"] = draw(st.sampled_from([None, 0.0, 1.0, 4.0]))
     rules["until_natural"] = draw(st.booleans())
     rules["settle_bias"], rules["settle_s"] = draw(st.sampled_from([None, -0.77, -2.3, -9.1])), draw(st.sampled_from([0.2, 0.5]))
+    rules["variation"] = draw(st.sampled_from([None, None, Variation(0.0), Variation(1.0, 0), Variation(4.0, 2)]))
     masks = st.one_of(st.none(), st.lists(st.booleans(), min_size=len(names), max_size=len(names)))
     asked = draw(st.lists(st.tuples(st.integers(0, 6), masks, st.sampled_from([False] * 4 + [True])), min_size=1, max_size=25))
     return made, rules, asked
@@ -47,7 +51,7 @@ def scenes(draw):
 @given(scenes())
 def test_every_update_follows_from_the_rules_read_frame_by_frame(scene):
     database, rules, asked = scene
-    one = Controller(Selector([Entry("a", database)]), ControllerSettings(**rules, rate=RATE))
+    one = Controller(Selector([Entry("a", database)]), ControllerSettings(**rules, rate=RATE), rng=SEED)
     oracle = Oracle(database, rules)
     for place, mask, interrupt in asked:
         decision = one.update(DT, [float(place)], None if mask is None else np.array(mask), interrupt=interrupt)
@@ -66,6 +70,7 @@ class Oracle:
         self.frame, self.tick, self.searched_at, self.played = None, 0, 0, {}
         self.held, self.waiting_from, self.entered_at = "", None, 0
         self.settle_bias, self.settle_s = rules["settle_bias"] or 0.0, rules["settle_s"]
+        self.variation, self.recent, self.n_drawn = rules["variation"], [], 0
 
     def update(self, place, mask, interrupt=False):
         self.tick += 1
@@ -94,6 +99,7 @@ class Oracle:
         if chosen == following and (may_continue or not searched):
             return onward, searched, chosen
         self.entered_at = self.tick
+        self.recent.insert(0, self._asset(chosen))
         return Action.START if before is None else Action.JUMP, True, chosen
 
     def _held_by_nature(self, following, is_looped):
@@ -135,21 +141,40 @@ class Oracle:
         return self.database.assets[self.database.range_of(frame)]
 
     def _best(self, place, mask, here, may_continue, is_ended):
-        found, least = None, math.inf
+        found, least, costs = None, math.inf, {}
         for frame in range(self.database.n_frames):
             is_current = may_continue and frame == here
             if not is_current and not self._may_enter(frame, mask, here, is_ended):
                 continue
             cost = self._cost(frame, place)
             cost += self.database.biases.continuing if is_current else 0.0
+            costs[frame] = cost
             if cost < least or (cost == least and is_current):
                 found, least = frame, cost
+        if self.variation is not None and found is not None:
+            if may_continue and costs[here] <= least + self.variation.within:
+                return here
+            found = self._drawn({frame: cost for frame, cost in costs.items() if cost <= least + self.variation.within})
+            least = costs[found]
         if may_continue and found is not None and found != here:
             into, own = (self.database.range_of(frame) for frame in (found, here))
             is_to_loop = self.database.marks.looping[into] and not self.database.marks.looping[own]
             playing_on = self._cost(here, place) + self.database.biases.continuing + self._settling()
             return here if not is_to_loop and self._settling() and playing_on <= least else found
         return found
+
+    def _drawn(self, ties):
+        """One of the best frames of ranges, by the generator of Steele and others that Java calls SplittableRandom."""
+        of_ranges = {}
+        for frame in sorted(ties, key=lambda frame: (ties[frame], frame)):
+            of_ranges.setdefault(self.database.range_of(frame), frame)
+        frames = [of_ranges[i] for i in sorted(of_ranges)]
+        among = [frame for frame in frames if self._asset(frame) not in self.recent[: self.variation.memory]] or frames
+        self.n_drawn += 1
+        mixed = (SEED + self.n_drawn * 0x9E3779B97F4A7C15) % 2**64
+        for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+            mixed = (mixed ^ mixed >> shift) * factor % 2**64
+        return among[((mixed ^ mixed >> 31) >> 32) * len(among) >> 32]
 
     def _settling(self):
         """What was entered just now is left for a large gain only."""

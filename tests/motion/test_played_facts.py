@@ -10,6 +10,7 @@ from test_character import CHANNELS, COLUMNS, CONDITIONS, DT, NAMES, clips, part
 
 import contextdb as cdb
 from contextdb import motion
+from contextdb.core import going
 from contextdb.motion.characters.played import MOST_S, Played
 from contextdb.motion.selection.decision import Playing
 
@@ -41,13 +42,32 @@ def test_until_down_is_the_first_contact_of_the_clip_from_now_on(asset, time_s, 
     _, _, bank = parts()
     number = bank.range_of(asset)
     contacts = bank.contacts[bank.starts[number] : bank.stops[number], foot]
-    now = min(round(time_s * 30.0), len(contacts) - 1)
+    now = min(math.floor(time_s * 30.0 + 0.5), len(contacts) - 1)
     rounds = 2 if bank.looping[number] else 1
     later = [i for i in range(now, len(contacts) * rounds) if contacts[i % len(contacts)]]
     expected = min((later[0] - now) / 30.0, MOST_S) if later else MOST_S
     asked = played(asset, time_s)
     assert asked.until_down_s(foot) == pytest.approx(expected)
     assert asked.is_down(foot) == bool(contacts[now])
+
+
+def place_at(path, frame):
+    """Where a path is at a frame, by itself."""
+    low = min(max(int(frame), 0), len(path) - 1)
+    share = min(max(frame - low, 0.0), 1.0)
+    here, there = path[low].tolist(), path[min(low + 1, len(path) - 1)].tolist()
+    return [one + share * (other - one) for one, other in zip(here, there, strict=True)]
+
+
+@given(st.integers(1, 90), st.floats(0.0, 4.0))
+def test_speed_and_turn_are_those_between_two_places_a_second_apart(n, at_s):
+    path = np.random.default_rng(n).normal(size=(n, 3)).astype(np.float32)
+    first, last = max(at_s * 30.0 - 15.0, 0.0), min(at_s * 30.0 + 15.0, n - 1.0)
+    (x, z, heading), (to_x, to_z, to_heading) = place_at(path, first), place_at(path, last)
+    seconds = (last - first) / 30.0
+    moved = [math.hypot(to_x - x, to_z - z), math.degrees(to_heading - heading)]
+    expected = [each / seconds for each in moved] if last > first else [0.0, 0.0]
+    assert going(path, 30.0, at_s) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
 @pytest.mark.parametrize(("asset", "speed"), [("walk", 1.3), ("jog", 2.6), ("idle", 0.0)])

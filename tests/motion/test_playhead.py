@@ -14,7 +14,7 @@ from contextdb.motion.markup.markup import Markup
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.playhead import Playhead
-from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion, motion_between
+from contextdb.motion.selection.root_motion import NO_MOTION, RootMotion
 
 SCHEMA = FeatureSchema.from_dict("loco", {"rate": 30.0, "channels": [{"type": "velocity", "bone": "Hips"}]})
 
@@ -132,20 +132,3 @@ def test_a_repeated_movement_is_made_as_often(move, times):
     assert (found.left_m, found.ahead_m, found.turn_rad) == pytest.approx(
         (expected.left_m, expected.ahead_m, expected.turn_rad), abs=1e-9
     )
-
-
-def place_at(path, frame):
-    """Where a path is at a frame, by itself."""
-    low = min(max(int(frame), 0), len(path) - 1)
-    share = min(max(frame - low, 0.0), 1.0)
-    here, there = path[low].tolist(), path[min(low + 1, len(path) - 1)].tolist()
-    return [one + share * (other - one) for one, other in zip(here, there, strict=True)]
-
-
-@given(st.integers(1, 9), st.floats(-2.0, 11.0), st.floats(-2.0, 11.0))
-def test_the_movement_between_two_moments_is_that_between_their_places_near_and_far(n, start, end):
-    path = np.random.default_rng(n).normal(size=(n, 3)).astype(np.float32)
-    (x, z, heading), (to_x, to_z, to_heading) = place_at(path, start), place_at(path, end)
-    sin, cos = math.sin(heading), math.cos(heading)
-    left, ahead = cos * (to_x - x) - sin * (to_z - z), sin * (to_x - x) + cos * (to_z - z)
-    assert motion_between(path, start, end) == RootMotion(left, ahead, to_heading - heading)

@@ -2,52 +2,84 @@
 
 import random
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from lines import DT, RATE, line
 
-from contextdb.motion import Hit
-from contextdb.motion.selection.variation import Variation, restore, state_of
+from contextdb.errors import ContextError
+from contextdb.motion import Controller, ControllerSettings, Entry, Selector, Variation
 
 
-def ties(*assets):
-    return [Hit(asset, i, i, 0.0) for i, asset in enumerate(assets)]
+def places(names):
+    """A database of assets that are as near to 0 as each other, and that are all over after a frame."""
+    return line(**{name: [0.0, 50.0] for name in names})
+
+
+def varying(databases, variation, rng=None):
+    selector = databases if isinstance(databases, Selector) else Selector([Entry("a", databases)])
+    every = {"search_every_s": 0.0, "jump_threshold_s": 0.0, "history_s": 0.0, "rate": RATE}
+    return Controller(selector, ControllerSettings(**every, variation=variation), rng=rng)
+
+
+def played(one, n, **asked):
+    return "".join(one.update(DT, [0.0], **asked).playing.asset for _ in range(n))
 
 
 def test_every_near_tie_is_as_likely():
-    rng = random.Random(1)
-    counts = Counter(Variation(0.1).choose(ties("a", "b", "c"), (), rng).asset for _ in range(3000))
+    counts = Counter(played(varying(places("abc"), Variation(0.1), seed), 1) for seed in range(3000))
+    assert all(900 < counts[asset] < 1100 for asset in "abc")
+    counts = Counter(played(varying(places("abc"), Variation(0.1, 0), 1), 3000))
     assert all(900 < counts[asset] < 1100 for asset in "abc")
 
 
 def test_what_was_chosen_lately_is_not_chosen_again_while_there_is_another():
-    variation, rng = Variation(0.1, memory=2), random.Random(2)
-    recent, chosen = (), []
-    for _ in range(200):
-        chosen.append(variation.choose(ties("a", "b", "c", "d"), recent, rng).asset)
-        recent = variation.remember(recent, chosen[-1])
+    chosen = played(varying(places("abcd"), Variation(0.1, 2), 2), 200)
     assert all(chosen[i] not in chosen[max(0, i - 2) : i] for i in range(len(chosen)))
     assert set(chosen) == set("abcd")
-    assert variation.choose(ties("a"), ("a",), rng).asset == "a"
+    assert played(varying(places("a"), Variation(0.1, 2)), 5) == "aaaaa"
 
 
-@given(st.integers(0, 4), st.lists(st.sampled_from("abc"), max_size=8))
-def test_the_memory_holds_the_last_assets(memory, played):
-    recent = ()
-    for asset in played:
-        recent = Variation(0.1, memory).remember(recent, asset)
-    assert list(recent) == played[len(played) - min(memory, len(played)) :]
+@pytest.mark.parametrize("at", [19, 20])
+@pytest.mark.parametrize("number", [-1.0, 2.0**53, np.nan, np.inf])
+def test_a_seed_that_is_none_is_no_state(at, number):
+    chooser = varying(places("ab"), Variation(0.1)).chooser
+    row = chooser.begun()
+    assert chooser.are_rows(row)
+    row[0, at] = number
+    assert not chooser.are_rows(row)
 
 
-@pytest.mark.parametrize("make", [lambda: random.Random(7), lambda: np.random.default_rng(7)])
-def test_the_same_seed_and_a_restored_generator_choose_the_same_again(make):
-    variation, rng, other = Variation(0.1), make(), make()
-    first = [variation.choose(ties(*"abcde"), (), rng) for _ in range(20)]
-    assert [variation.choose(ties(*"abcde"), (), other) for _ in range(20)] == first
-    state = state_of(rng)
-    following = [variation.choose(ties(*"abcde"), (), rng) for _ in range(20)]
-    restore(rng, state)
-    assert [variation.choose(ties(*"abcde"), (), rng) for _ in range(20)] == following
-    assert state_of(None) is None
+def test_a_seed_is_a_number_or_drawn_from_a_generator():
+    def drawn(rng):
+        return played(varying(places("pqrstuvw"), Variation(0.1), rng), 12)
+
+    assert drawn(None) == drawn(0) == drawn(1 << 53) != drawn(1)
+    assert drawn(random.Random(1)) == drawn(int(random.Random(1).random() * (1 << 53))) != drawn(random.Random(2))
+    assert drawn(np.random.default_rng(1)) == drawn(np.random.default_rng(1)) != drawn(np.random.default_rng(2))
+    assert drawn(-1) == drawn((1 << 53) - 1)
+    for wrong in ("1", 1.5, random.Random):
+        with pytest.raises(ContextError, match="rng is of type"):
+            varying(places("p"), Variation(0.1), wrong)
+
+
+def test_an_asset_that_played_in_another_database_is_remembered_too():
+    selector = Selector([Entry("a", places("p")), Entry("b", places("pq"))])
+    one = varying(selector, Variation(0.5))
+    one.update(DT, [0.0], among=["a"])
+    assert one.state.recent == ("p",)
+    assert played(one, 4, among=["b"]) == "qpqp"
+
+
+def test_settings_with_another_memory_keep_the_assets_that_were_played_last():
+    one = varying(places("pqrs"), Variation(0.5, 3), 1)
+    last = played(one, 5)[-3:]
+    assert one.state.recent == tuple(last)
+    drawn = one.state.rng
+    one.settings = replace(one.settings, variation=Variation(0.5, 1))
+    one.restore(one.state)
+    assert (one.state.recent, one.state.rng) == ((last[-1],), drawn)
+    one.settings = replace(one.settings, variation=None)
+    one.restore(one.state)
+    assert (one.state.recent, one.state.rng) == ((), drawn)

@@ -285,6 +285,12 @@ _FUNCTIONS: tuple[tuple[str, str, str, tuple[str, ...]], ...] = (
         (*_GIVEN, f"return cdb_query({_TABLE}, given, unknown, rows, room, fault);"),
     ),
     (
+        "query_widened",
+        f"{_ASKED}, uint64_t *rows, size_t room, cdb_fault *fault",
+        "Those that stay valid where they play already: see cdb_query_widened.",
+        (*_GIVEN, f"return cdb_query_widened({_TABLE}, given, unknown, rows, room, fault);"),
+    ),
+    (
         "pick",
         f"{_ASKED}, const uint64_t *rows, size_t room, double time_s, cdb_picker *picker, int64_t *row, cdb_fault *fault",
         "One of the valid rows, by the table's policy: see cdb_pick.",

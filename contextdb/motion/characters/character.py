@@ -13,7 +13,6 @@ A character reads no clock: the same calls give the same poses.
 from __future__ import annotations
 
 import math
-import random
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from typing import Unpack
@@ -126,6 +125,8 @@ class Character:
         self.controller, self.schema, self.stream, self.pose = controller, schema, stream, pose
         self.own_facts, self.unknown, self.ground = dict(own_facts), unknown, ground
         self.tables = tables
+        self._is_posed = True
+        """Whether updates make poses; a one-off makes its own."""
         self._own = OwnFacts.of(None, {})
         self._body: Steered | None = None
         self._stand(walks.begun(schema.ways, body), body)
@@ -139,7 +140,7 @@ class Character:
         poses: bool = True,
         body: Steered = AT_REST,
         own_facts: Mapping[str, FactOf] = FACTS,
-        rng: Rng | None = None,
+        rng: Rng | int | None = None,
         clock: Clock | None = None,
     ) -> Character:
         """The character of a `[controllers.NAME]` of a project: its databases and pose banks opened or built, its tables compiled.
@@ -153,8 +154,8 @@ class Character:
             False for a character without a pose stream.
         body, own_facts
             As above.
-        rng : random.Random or numpy Generator, optional
-            For the variation that its settings may ask for. Default: `random.Random(0)`.
+        rng : int, random.Random or numpy Generator, optional
+            The seed of the variation that its settings may ask for; one is drawn of a generator. Default: 0.
         clock : function, optional
             Gives seconds: only for `Decision.search_us`.
 
@@ -166,7 +167,7 @@ class Character:
             As `open_or_build`.
         """
         parts = Parts.of(project, name, poses)
-        controller = parts.config.controller(name, parts.databases, rng=random.Random(0) if rng is None else rng, clock=clock)
+        controller = parts.config.controller(name, parts.databases, rng=rng, clock=clock)
         stream = None if parts.banks is None else PoseStream(parts.banks, parts.config.output_of(name))
         return cls(controller, parts.schema, parts.tables, stream, body, own_facts=own_facts)
 
@@ -254,28 +255,24 @@ class Character:
     def state(self) -> bytes:
         """Where the character is, to come back to with `restore`: all that its next pose depends on beside what it is then given.
 
-        One flat block, which a game in C goes on from (the core's character.h); behind it, where the settings vary what is
-        played, where that stands. Equal states have equal futures. The facts of live contexts are the game's and not in it.
+        One flat block, which a game in C goes on from (the core's character.h). Equal states have equal futures. The facts of live
+        contexts are the game's and not in it.
         """
         displayed = NOTHING_DISPLAYED if self.stream is None else self.stream.displayed
         pose = b"" if self.stream is None else self.stream.state.row.tobytes()
-        return b"".join((self._row.tobytes(), self.controller.row.tobytes(), displayed.tobytes(), pose, self.controller.varied))
+        return b"".join((self._row.tobytes(), self.controller.row.tobytes(), displayed.tobytes(), pose))
 
     def restore(self, state: bytes) -> None:
         """Go on from a state of this character, or of another one with the same parts; raises ContextError for anything else."""
         ways, chooser, stream = self.schema.ways, self.controller.chooser, self.stream
         widths = ways.width, chooser.width, N_DISPLAYED, 0 if stream is None else stream.width
-        size = 8 * sum(widths)
-        if not isinstance(state, bytes) or len(state) < size:
+        if not isinstance(state, bytes) or len(state) != 8 * sum(widths):
             raise ContextError(NO_STATE)
-        walk, row, displayed, pose = np.split(np.frombuffer(state[:size]).copy(), np.cumsum(widths[:3]).tolist())
+        walk, row, displayed, pose = np.split(np.frombuffer(state).copy(), np.cumsum(widths[:3]).tolist())
         is_right = walks.are_walks(ways, walk[None]) and chooser.are_rows(row[None]) and bool(np.isfinite(pose).all())
-        before = self.controller.place
-        if not is_right or not self.controller.stand_on(row[None], state[size:]):
+        if not is_right or (stream is not None and not stream.stand_on(displayed, pose)):
             raise ContextError(NO_STATE)
-        if stream is not None and not stream.stand_on(displayed, pose):
-            self.controller.put_back(before)
-            raise ContextError(NO_STATE)
+        self.controller.stand_on(row[None])
         self._stand(walk[None], None)
 
     def update(
@@ -429,7 +426,7 @@ class Character:
     def _answer(self, step: Step, decided: Decided, before: ControllerPlace) -> Updated:
         """The pose after a decision; `before` is where the controller stood."""
         on, ways, poses, roots, moves_body = step.on, self.schema.ways, None, step.on.places, STAYS
-        if self.stream is not None:
+        if self.stream is not None and self._is_posed:
             try:
                 poses, moves_body = self.stream.posed(decided, step.dt_s, on.places, self.ground)
             except Exception:

@@ -88,8 +88,7 @@ def is_asked(name: str, function: FactOf, condition: Condition) -> bool:
 
 def fact_of_played(name: str, condition: Condition) -> FactOf | None:
     """The function of a fact of what plays, where a condition of that name asks for one."""
-    played = of_played(name, condition)
-    if played is None:
+    fact = of_played(name, condition)
+    if fact is None:
         return None
-    value_of, before = played
-    return lambda moment: before if moment.played is None else value_of(moment.played)
+    return lambda moment: fact.before if moment.played is None else fact.value_of(moment.played)

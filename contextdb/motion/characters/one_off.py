@@ -64,11 +64,11 @@ class OneOff:
         position = (place.left_m, place.ahead_m)
         x, z = ((new - old) / dt for new, old in zip(position, before.position, strict=True)) if dt else before.velocity
         body = replace(before, position=position, velocity=(x, z), heading=place.turn_rad, acceleration=(0.0, 0.0))
-        character.stream = None
+        character._is_posed = False
         try:
             updated = character.update(dt, stick, facts, body=body)
         finally:
-            character.stream = self._stream
+            character._is_posed = True
         self.play.advance(dt)
         self.decision = self.play.decision(self.database)
         pose = self._stream.update(self.decision, dt, body, character.ground)

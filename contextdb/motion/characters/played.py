@@ -11,6 +11,8 @@ A table asks for such a fact by a condition of its name, like for any other: `[c
 | `Playing.Phase` | number | the share of the clip that has played, 0 to 1 |
 | `Playing.Tag.NAME` | bool | whether the frame has this tag of the markup, or one below it |
 
+The core computes them, see `contextdb/core/played.h`; a bundle names each by the letter that is first in `FACTS`.
+
 Before anything plays no foot is down, and everything else is 0 or false. Of a mirrored clip the feet are those that are seen.
 
 Source: the talk on walking of Tom Forsyth, in which the next step begins with the foot that is free.
@@ -18,24 +20,21 @@ Source: the talk on walking of Tom Forsyth, in which the next step begins with t
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from contextdb.cells.conditions import Condition
+from contextdb.core import going, phase, until_down_s
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.records import quickly_made
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.decision import Playing
-from contextdb.motion.selection.root_motion import motion_between
 
 MOST_S = 10.0
-WINDOW_S = 1.0
-"""Speed and turn are means over so much of the clip, as a body sways with its steps."""
-FEET = ("LeftFoot", "RightFoot")
-DOWN, UNTIL, TAG = ".Down", ".UntilDown_s", "Playing.Tag."
+TAG = "Playing.Tag."
 
 
 @quickly_made
@@ -53,70 +52,75 @@ class Played:
 
     def until_down_s(self, foot: int) -> float:
         """Seconds until a foot is down, in the clip's own time; `MOST_S` where it never is, or not before the clip ends."""
-        if self.bank is None or foot >= len(self.bank.feet):
+        if self.bank is None:
             return MOST_S
         number = self.bank.range_of(self.playing.asset, self.playing.mirrored)
-        down = self.bank.contacts[self.bank.starts[number] : self.bank.stops[number], foot]
-        first = min(max(round(self.playing.time_s * self.bank.rate), 0), len(down) - 1)
-        ahead = np.concatenate((down[first:], down[:first])) if self.bank.looping[number] else down[first:]
-        return min(float(np.argmax(ahead)) / self.bank.rate, MOST_S) if ahead.any() else MOST_S
+        contacts = np.ascontiguousarray(self.bank.contacts[self.bank.starts[number] : self.bank.stops[number]])
+        return until_down_s(contacts, foot, bool(self.bank.looping[number]), float(self.bank.rate), self.playing.time_s)
 
     def motion(self) -> tuple[float, float]:
         """How fast the clip goes, m/s, and turns, degrees a second, about now."""
         if self.database is None or self.database.root is None or self.database.schema is None:
             return 0.0, 0.0
-        start, stop = (int(each[self.playing.range]) for each in (self.database.starts, self.database.stops))
-        rate, half = self.database.schema.rate, WINDOW_S * self.database.schema.rate / 2.0
-        now = self.playing.time_s * rate
-        first, last = max(now - half, 0.0), min(now + half, float(stop - start - 1))
-        if last <= first:
-            return 0.0, 0.0
-        moved, seconds = motion_between(self.database.root[start:stop], first, last), (last - first) / rate
-        return math.hypot(moved.left_m, moved.ahead_m) / seconds, math.degrees(moved.turn_rad) / seconds
+        return going(
+            np.ascontiguousarray(self.database.root[self._frames], np.float32), self.database.schema.rate, self.playing.time_s
+        )
 
     def phase(self) -> float:
         """The share of the clip that has played."""
         if self.database is None or self.database.schema is None:
             return 0.0
-        start, stop = (int(each[self.playing.range]) for each in (self.database.starts, self.database.stops))
-        last_s = max(stop - start - 1, 1) / self.database.schema.rate
-        return min(max(self.playing.time_s / last_s, 0.0), 1.0)
+        return phase(self._frames.stop - self._frames.start, self.database.schema.rate, self.playing.time_s)
+
+    @property
+    def _frames(self) -> slice:
+        """Those of the clip in its database."""
+        assert self.database is not None, "asked where there is one"
+        return slice(int(self.database.starts[self.playing.range]), int(self.database.stops[self.playing.range]))
 
     def has_tag(self, tag: str) -> bool:
         """Whether the frame has a tag, or one below it."""
-        if self.database is None:
-            return False
-        wanted = tag.casefold()
-        return any(f"{own.casefold()}.".startswith(f"{wanted}.") for own in self.database.marks.tags_of(self.playing.frame))
+        return self.database is not None and bool(
+            self.database.marks.kinds_with(tag)[self.database.marks.kinds[self.playing.frame]]
+        )
 
 
 OfPlayed = Callable[[Played], object]
-UNITS: dict[str, tuple[str, ...]] = {
-    "Playing.Speed": ("", "m/s", "mps", "m / s"),
-    "Playing.Turn": ("", "degrees/s", "deg/s", "°/s", "dps", "degrees a second"),
-    "Playing.Phase": ("",),
-    UNTIL: ("", "s", "seconds"),
+
+
+class FactOfPlayed(NamedTuple):
+    """A fact of what plays: its letter in a bundle, how it is answered, and what it is before anything plays."""
+
+    letter: str
+    value_of: OfPlayed
+    before: object
+    units: tuple[str, ...] = ()
+    """Those in which a number is answered; none for True and False."""
+
+
+UNTIL = ("", "s", "seconds")
+FACTS = {
+    "LeftFoot.Down": FactOfPlayed("l", lambda played: played.is_down(0), False),
+    "RightFoot.Down": FactOfPlayed("r", lambda played: played.is_down(1), False),
+    "LeftFoot.UntilDown_s": FactOfPlayed("L", lambda played: played.until_down_s(0), MOST_S, UNTIL),
+    "RightFoot.UntilDown_s": FactOfPlayed("R", lambda played: played.until_down_s(1), MOST_S, UNTIL),
+    "Playing.Speed": FactOfPlayed("v", lambda played: played.motion()[0], 0.0, ("", "m/s", "mps", "m / s")),
+    "Playing.Turn": FactOfPlayed(
+        "w", lambda played: played.motion()[1], 0.0, ("", "degrees/s", "deg/s", "°/s", "dps", "degrees a second")
+    ),
+    "Playing.Phase": FactOfPlayed("p", lambda played: played.phase(), 0.0, ("",)),
 }
 
 
-def of_played(name: str, condition: Condition) -> tuple[OfPlayed, object] | None:
-    """How a condition of that name is answered from what plays, and what it is before anything plays; None for any other name,
-    and for a condition of another type or unit."""
-    type_, unit = condition.domain.type, condition.unit.strip()
-    is_bool = type_.fixed == (False, True)
-    is_number = type_.is_decimal and not (type_.is_whole or type_.is_circular)
-    foot = next((i for i, each in enumerate(FEET) if name in (each + DOWN, each + UNTIL)), None)
-    if foot is not None and name.endswith(DOWN):
-        return (lambda played: played.is_down(foot), False) if is_bool else None
+def of_played(name: str, condition: Condition) -> FactOfPlayed | None:
+    """How a condition of that name is answered from what plays; None for any other name, and for a condition of another type or
+    unit."""
+    type_ = condition.domain.type
+    fact = FACTS.get(name)
     if name.startswith(TAG) and len(name) > len(TAG):
-        return (lambda played: played.has_tag(name.removeprefix(TAG)), False) if is_bool else None
-    if not is_number or unit not in UNITS.get(UNTIL if foot is not None else name, ()):
-        return None
-    if foot is not None:
-        return lambda played: played.until_down_s(foot), MOST_S
-    functions: dict[str, OfPlayed] = {
-        "Playing.Speed": lambda played: played.motion()[0],
-        "Playing.Turn": lambda played: played.motion()[1],
-        "Playing.Phase": lambda played: played.phase(),
-    }
-    return functions[name], 0.0
+        tag = name.removeprefix(TAG)
+        fact = FactOfPlayed(f"g={tag}", lambda played: played.has_tag(tag), False)
+    if fact is None or not fact.units:
+        return fact if type_.fixed == (False, True) else None
+    is_number = type_.is_decimal and not (type_.is_whole or type_.is_circular)
+    return fact if is_number and condition.unit.strip() in fact.units else None

@@ -152,6 +152,11 @@ class Marks:
         """The flags of a frame."""
         return Mark(int(self.kind_marks[self._kind_of(frame)]))
 
+    def kinds_with(self, tag: str) -> Flags:
+        """Whether frames of each kind have a plain tag, in any case, or one below it: bool [K]."""
+        at = [i for i, own in enumerate(self.tags) if covers(tag.casefold(), own.casefold())]
+        return np.asarray(self.kind_tags[:, at].any(axis=1))
+
     def tags_of(self, frame: int) -> tuple[str, ...]:
         """The plain tags of a frame, sorted."""
         return tuple(self.tags[i] for i in np.flatnonzero(self.kind_tags[self._kind_of(frame)]).tolist())

@@ -270,10 +270,7 @@ class MotionDatabase(Searched):
         """
         if not isinstance(within, Real) or not within >= 0.0:
             raise QueryError(Fault(f"the costs may differ by {within!r}.", "a number, 0 or more"))
-        return self.best_of_ranges_filtered(query, within, self.filter(valid, **options))
-
-    def best_of_ranges_filtered(self, query: ArrayLike, within: float, chosen: Filter) -> list[Hit]:
-        """The same of what a filter lets pass."""
+        chosen = self.filter(valid, **options)
         best = float(self._searcher.least(query, chosen, math.inf, 1)[1][0])
         if best == math.inf:
             return []

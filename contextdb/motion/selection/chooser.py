@@ -36,15 +36,16 @@ from contextdb.motion.selection.decision import Playing
 from contextdb.motion.selection.events import Event, astray, checked, leads, seconds_to
 from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags, OfValidForMany, SearchOptions
 from contextdb.motion.selection.selector import Selector, choice_of
+from contextdb.motion.selection.variation import asset_keys
 
 ASK, CHOOSE, DECIDE = 1, 2, 4
-N_STATE, N_PLAYED, N_MOVED, N_DECISION = 19, 4, 16, 39
-TIME, PLAYING, N_REMEMBERED, PLAY, ENTERED = 1, slice(5, 9), 9, slice(10, 18), 18
+N_STATE, N_PLAYED, N_MOVED, N_DECISION = 21, 4, 16, 39
+TIME, PLAYING, N_REMEMBERED, PLAY, ENTERED, RNG = 1, slice(5, 9), 9, slice(10, 18), 18, slice(19, 21)
 ACTION, CAUSE, HELD, STANDING, WINNER, IS_UNDER, CHOSEN, CURRENT = 2, 3, 4, 5, 16, 17, slice(18, 22), 29
 """Columns of a row, and of a decision."""
 NEW, WIDENED = (0.0, 2.0), 1.0
 """Actions that enter another frame, and what stands by hysteresis."""
-NO_DATABASE, GONE, GO_ON = -1, -2, -2
+NO_DATABASE, GONE = -1, -2
 MOST_PLAYED, MOST_JUMPS_PER_S = 1024, 60.0
 """So much of what was played is remembered at most, and so many jumps of each second."""
 MOST_CHOOSERS, MOST_ANSWERS = 16, 64
@@ -229,6 +230,8 @@ class Chooser:
         self.rates = [settings.rate if d is None or d.schema is None else d.schema.rate for d in self.databases]
         a_second = max(self.rates) * settings.max_play_rate + MOST_JUMPS_PER_S
         self.n_played = self._most_played(a_second)
+        varies = settings.variation
+        self.n_recent = 0 if varies is None else varies.memory
         self.core = Controllers(
             tuple(self.part(*each) for each in zip(selector.entries, self.databases, self.rates, strict=True)),
             self.n_played,
@@ -241,6 +244,9 @@ class Chooser:
             settings.settle_s,
             settings.asset_history_s,
             settings.until_natural,
+            varies is not None,
+            0.0 if varies is None else varies.within,
+            self.n_recent,
         )
         self.width: int = self.core.width
         self.n_features = next((d.n_features for d in self.databases if d is not None), 0)
@@ -273,17 +279,18 @@ class Chooser:
         """One database as the core takes it."""
         threshold = math.nan if entry.threshold is None else float(entry.threshold)
         if database is None:
-            return (None,) * 8 + (rate, threshold, math.inf, 0.0, 0.0, 1, 0, 0, 1.0)
+            return (None,) * 9 + (rate, threshold, math.inf, 0.0, 0.0, 1, 0, 0, 1.0)
         marks, root = database.marks, database.root
         pace = None if database.schema is None else database.schema.speed_features
         columns, pace_s = (slice(0, 0), 1.0) if pace is None else pace
         arrays = (marks.looping, root if root is None else np.asarray(root, np.float32), marks.kind_marks, marks.kind_root_weights)
         first: dict[str, int] = {}
         same = [first.setdefault(asset, number) for number, asset in enumerate(database.assets)]
+        keys = asset_keys(database.assets) if self.n_recent else None
         bounds = (np.asarray(each, np.int64) for each in (database.starts, database.stops, same))
         return (
             database.frames,
-            *(each if each is None else np.ascontiguousarray(each) for each in (*bounds, *arrays)),
+            *(each if each is None else np.ascontiguousarray(each) for each in (*bounds, keys, *arrays)),
             rate,
             threshold,
             self.settings.bar_of(database),
@@ -312,12 +319,25 @@ class Chooser:
         if (playing := state.playing) is not None:
             at = self._range_of(playing)
             row[0, PLAYING] = (GONE, 0.0, 0.0, 0.0) if at is None else (*at, self._frame_at(at, playing.time_s), playing.time_s)
+        row[0, RNG] = state.rng or (0, 0)
         known = [each for each in state.history if each.database in self.names][-self.n_played :] if self.n_played else []
         row[0, N_REMEMBERED] = len(known)
         for i, each in enumerate(known):
             start = N_STATE + N_PLAYED * i
             row[0, start : start + N_PLAYED] = self.names.index(each.database), each.start, each.stop, each.time_s
+        recent = asset_keys(state.recent[::-1][: self.n_recent])
+        row[0, self.recent_at : self.recent_at + len(recent)] = recent
         return row
+
+    @property
+    def recent_at(self) -> int:
+        """The first column of the assets that are remembered."""
+        return self.width - self.n_recent
+
+    @cached_property
+    def _asset_of_key(self) -> dict[float, str]:
+        assets = [asset for _, database in self._loaded() for asset in database.assets]
+        return dict(zip(asset_keys(assets).tolist(), assets, strict=True))
 
     def _range_of(self, playing: Playing) -> tuple[int, int] | None:
         """The database and the range that play, also in a database that was built again."""
@@ -338,13 +358,16 @@ class Chooser:
         start, stop = int(database.starts[at[1]]), int(database.stops[at[1]])
         return min(max(start, start + round(time_s * self.rates[at[0]])), stop - 1)
 
-    def state(self, row: Sequence[float], playing: Playing | None, recent: tuple[str, ...]) -> ControllerState:
+    def state(self, row: Sequence[float], playing: Playing | None) -> ControllerState:
         """A row as a state; `playing` is what plays, also where that is gone."""
         tick, time_s, since_s, rate, waiting_s = row[:5]
         each = [row[N_STATE + N_PLAYED * i : N_STATE + N_PLAYED * (i + 1)] for i in range(int(row[N_REMEMBERED]))]
         history = tuple(Played(self.names[int(d)], int(start), int(stop), played_s) for d, start, stop, played_s in each)
         waiting_since_s = None if math.isnan(waiting_s) else waiting_s
-        known = waiting_since_s, RowPlay.of(row[PLAY]), row[ENTERED]
+        keys = row[self.recent_at :]
+        recent = tuple(self._asset_of_key[key] for key in reversed(keys) if key in self._asset_of_key) if any(keys) else ()
+        seed, n_drawn = row[RNG]
+        known = waiting_since_s, RowPlay.of(row[PLAY]), row[ENTERED], (int(seed), int(n_drawn))
         return ControllerState(int(tick), time_s, playing, since_s, history, recent, rate, *known)
 
     def playing(self, numbers: Sequence[float]) -> Playing | None:
@@ -375,7 +398,7 @@ class Chooser:
             self.move(np.ascontiguousarray(rows), 0.0)
         except ValueError:
             return False
-        databases = rows[:, N_STATE::N_PLAYED]
+        databases = rows[:, N_STATE : self.recent_at : N_PLAYED]
         return bool(np.isin(databases, np.arange(len(self.names))).all() if databases.size else True)
 
     # ---- what may be chosen

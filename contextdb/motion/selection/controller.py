@@ -6,7 +6,7 @@ pose, with its bias; some frames are not candidates because of what plays and wh
 `contextdb/core/controller.h`). Without a result the character plays on, or holds the last frame of a clip that has
 ended. What is no longer valid may play on for a while too: see `contextdb.motion.selection.guards`.
 
-A controller reads no clock and draws no random number of its own: the same calls give the same decisions.
+A controller reads no clock: the same calls, with the same seed, give the same decisions.
 
 Source: the settings of Unreal's motion matching node (throttle, jump threshold, reselect history, continuing pose, interrupt);
 DoNotChoose, NextNaturalOnly and root motion weight of EA's talk.
@@ -15,7 +15,6 @@ DoNotChoose, NextNaturalOnly and root motion weight of EA's talk.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -23,26 +22,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind
-from contextdb.errors import Fault, MotionError, QueryError
+from contextdb.errors import Fault, QueryError
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.records import quickly_made
-from contextdb.motion.search.hit import Hit
-from contextdb.motion.selection import variation
 from contextdb.motion.selection.chooser import (
     ASK,
     CAUSE,
     CHOOSE,
-    CHOSEN,
     DECIDE,
-    GO_ON,
     GONE,
     N_DECISION,
     PLAYING,
-    WINNER,
     Chooser,
     Given,
     Updates,
@@ -52,14 +46,14 @@ from contextdb.motion.selection.chooser import (
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decided import Asker, Question, decision_of
-from contextdb.motion.selection.decision import Action, Decision, Playing, Recorder, Watcher, plays
+from contextdb.motion.selection.decision import Decision, Playing, Recorder, Watcher, plays
 from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags, OfValid, OfValidForMany, SearchOptions
 from contextdb.motion.selection.selector import Selector
-from contextdb.motion.selection.variation import Rng
+from contextdb.motion.selection.variation import Rng, seed_of
 
 Clock = Callable[[], float]
-Place = tuple[Floats, int, Playing | None, bool, tuple[str, ...], object]
+Place = tuple[Floats, int, Playing | None, bool]
 FORCE, INTERRUPT = 1, 2
 
 
@@ -124,17 +118,15 @@ class Controller:
         May be exchanged too.
     recorder : Recorder, optional
         Is handed every decision.
-    rng : random.Random or numpy Generator, optional
-        For the variation that the settings ask for.
+    rng : int, random.Random or numpy Generator, optional
+        The seed of the variation that the settings may ask for; one is drawn of a generator. Default: 0.
     clock : function, optional
         Gives seconds, such as `time.perf_counter`: only for `Decision.search_us`.
 
     Raises
     ------
-    MotionError
-        The settings ask for variation, and there is no generator.
     ContextError
-        `selector` or `settings` are none.
+        `selector`, `settings` or `rng` are none.
     """
 
     def __init__(
@@ -142,20 +134,18 @@ class Controller:
         selector: Selector,
         settings: ControllerSettings = DEFAULT_SETTINGS,
         recorder: Recorder | None = None,
-        rng: Rng | None = None,
+        rng: Rng | int | None = None,
         clock: Clock | None = None,
     ) -> None:
         require_kind(selector, Selector, "selector", "a Selector")
         require_kind(settings, ControllerSettings, "settings", "ControllerSettings")
-        if settings.variation is not None and rng is None:
-            raise MotionError(Fault("the settings request variation, but there is no generator.", "rng=random.Random(seed)"))
         self.selector, self.settings, self.recorder = selector, settings, recorder
-        self._rng, self._clock = rng, clock
+        self._clock = clock
         self._watcher: Watcher | None = None
         """The link that watches the controller."""
         self._playing: Playing | None = None
         self._is_decoded = False
-        self._stand(Chooser.of(selector, settings), ControllerState())
+        self._stand(Chooser.of(selector, settings), ControllerState(rng=(seed_of(rng), 0)))
 
     @property
     def playing(self) -> Playing | None:
@@ -192,7 +182,7 @@ class Controller:
         """Stand where a state says."""
         self._chooser, self._settings = chooser, self.settings
         self._rows, self._at = chooser.encode(state), 0
-        self._playing, self._recent, self._is_decoded = state.playing, state.recent, False
+        self._playing, self._is_decoded = state.playing, False
 
     @property
     def _row(self) -> Floats:
@@ -207,37 +197,24 @@ class Controller:
 
     @property
     def _state(self) -> ControllerState:
-        return self._chooser.state(self._rows[self._at].tolist(), self.playing, self._recent)
+        return self._chooser.state(self._rows[self._at].tolist(), self.playing)
 
-    @property
-    def varied(self) -> bytes:
-        """Where what the settings vary stands, beside the row; empty where they vary nothing."""
-        return b"" if self._rng is None or self.settings.variation is None else variation.packed(self._recent, self._rng)
-
-    def stand_on(self, row: Floats, varied: bytes = b"") -> bool:
-        """Go on from a checked row [1, W] of this controller, or of another one with the same selector and settings, and from what
-        was `varied`; False where that is of none."""
-        recent = variation.unpacked(varied, self._rng)
-        if recent is None:
-            return False
-        self._rows, self._at = row, 0
-        self._playing, self._recent, self._is_decoded = None, recent, False
-        return True
+    def stand_on(self, row: Floats) -> None:
+        """Go on from a checked row [1, W] of this controller, or of another one with the same selector and settings."""
+        self._rows, self._at, self._playing, self._is_decoded = row, 0, None, False
 
     @property
     def place(self) -> Place:
         """Where the controller is, to `put_back` this one with the same selector and settings; it costs less than `state`."""
-        rng = None if self._rng is None or self.settings.variation is None else variation.state_of(self._rng)
-        return self._rows, self._at, self._playing, self._is_decoded, self._recent, rng
+        return self._rows, self._at, self._playing, self._is_decoded
 
     def put_back(self, place: Place) -> None:
         """Go back to where the controller was."""
-        self._rows, self._at, self._playing, self._is_decoded, self._recent, rng = place
-        variation.restore(self._rng, rng)
+        self._rows, self._at, self._playing, self._is_decoded = place
 
     def copy(self) -> Controller:
         """Another controller that stands where this one does, with the same selector and settings, and no recorder."""
-        copied = Controller(self.selector, self.settings, rng=deepcopy(self._rng), clock=self._clock)
+        copied = Controller(self.selector, self.settings, clock=self._clock)
         copied._stand(self.chooser, self._state)
         return copied
 
@@ -249,8 +226,7 @@ class Controller:
     @property
     def state(self) -> ControllerState:
         """Where the controller is, to come back to with `restore`."""
-        state = self._state
-        return state if self._rng is None else replace(state, rng=variation.state_of(self._rng))
+        return self._state
 
     def restore(self, state: ControllerState) -> None:
         """Go on from a state of this controller, or of another one with the same selector and settings.
@@ -258,8 +234,7 @@ class Controller:
         Raises ContextError for what is no state.
         """
         require_kind(state, ControllerState, "state", "a ControllerState, what `state` gives")
-        variation.restore(self._rng, state.rng)
-        self._stand(self.chooser, state)
+        self._stand(self.chooser, replace(state, rng=self._state.rng) if state.rng is None else state)
 
     def update(
         self,
@@ -344,8 +319,6 @@ class Controller:
     def take(self, updates: Updates, at: int, decision: Decision) -> None:
         """Go on from one of some updates, and hand its decision over."""
         self._rows, self._at, self._is_decoded = updates.after, at, False
-        if self.settings.variation is not None and decision.action in (Action.START, Action.JUMP):
-            self._recent = self.settings.variation.remember(self._recent, str(decision.playing and decision.playing.asset))
         if self.recorder is not None:
             self.recorder.record(decision)
         if self._watcher is not None and self._watcher.feed.is_open:
@@ -445,7 +418,7 @@ def _with_more(given: Given, chooser: Chooser, moved: Floats, asked: Asked, numb
 
 def _run(updates: Updates, own: Sequence[Controller]) -> float:
     """Ask, choose and decide; the microseconds of the search of each who searched, as the first one's clock says."""
-    if updates.chooser.settings.variation is None and not own[0]._clock:
+    if not own[0]._clock:
         updates.run(ASK | CHOOSE | DECIDE)
         return 0.0
     updates.run(ASK)
@@ -453,8 +426,6 @@ def _run(updates: Updates, own: Sequence[Controller]) -> float:
     began_s = own[0]._now_s() if n_searched else 0.0
     updates.run(CHOOSE)
     search_us = (own[0]._now_s() - began_s) * 1e6 / n_searched if n_searched else 0.0
-    for k, one in enumerate(own):
-        _vary(updates, k, one)
     updates.run(DECIDE)
     return search_us
 
@@ -480,24 +451,6 @@ def _wide(chooser: Chooser, moved: Floats, ranges: Flags, valid: Any, asked: Ask
             penalty = asked.options(numbers[i]).of(chooser.names[d])["penalties"]
             wide[i] = database.filter(widened, penalties=penalty).range_biases[at]
     return wide
-
-
-def _vary(updates: Updates, i: int, one: Controller) -> None:
-    """Exchange what was chosen for another frame that is about as good; to play on comes before all of them."""
-    varies, row, chooser = one.settings.variation, updates.decisions[i], updates.chooser
-    if varies is None or one._rng is None or row[CAUSE] == 0.0 or row[WINNER] < 0.0:
-        return
-    choice, d = updates.choice(i), int(row[WINNER])
-    entry, database = chooser.selector.entries[d], chooser.databases[d]
-    is_under, limit, continuing = bool(row[WINNER + 1]), choice.hit.cost + varies.within, float(row[WINNER - 1])
-    if (not is_under or updates.moved[i, 0] == d) and continuing <= limit:
-        row[CHOSEN.start] = GO_ON
-        return
-    assert database is not None, "what wins is of a database that is there"
-    ties = database.best_of_ranges_filtered(updates.given.queries[i], varies.within, updates.filter_of(i, d))
-    near: list[Hit] = [hit for hit in ties if not is_under or entry.threshold is None or hit.cost < entry.threshold]
-    hit = varies.choose(near, one._recent, one._rng)
-    row[CHOSEN] = d, hit.range, hit.frame, hit.cost
 
 
 def seconds_of(dt_s: float) -> float:

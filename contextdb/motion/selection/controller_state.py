@@ -47,8 +47,8 @@ class ControllerState:
         How the row of what plays says that it does; None where it says nothing.
     entered_s : float
         When what plays was entered, in seconds of play.
-    rng : object
-        Where the random generator is; None without one.
+    rng : (int, int), optional
+        The seed of what varies, and how often chance has decided. None leaves a controller that is put back its own.
     """
 
     tick: int = 0
@@ -61,4 +61,4 @@ class ControllerState:
     waiting_since_s: float | None = None
     play: RowPlay | None = None
     entered_s: float = 0.0
-    rng: object = None
+    rng: tuple[int, int] | None = None

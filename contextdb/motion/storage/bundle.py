@@ -30,9 +30,10 @@ from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.controller_settings import ControllerSettings
 from contextdb.motion.selection.events import events_of
 from contextdb.motion.selection.selector import Entry, Selector
+from contextdb.motion.selection.variation import asset_keys
 
-MAGIC = b"CDBMOTN1"
-DATABASE, BANK, CONTROLLER, TABLE, TAGS, MORE, JOINT, SET = 1, 40, 60, 90, 110, 120, 130, 160
+MAGIC = b"CDBMOTN2"
+DATABASE, BANK, CONTROLLER, TABLE, TAGS, MORE, JOINT, SET = 1, 44, 60, 90, 110, 120, 130, 160
 """The first kinds of the parts of each."""
 OUTPUT = (
     "blend", "halflife_s", "root", "position_weight", "rotation_weight", "position_pull_s", "rotation_pull_s",
@@ -42,6 +43,7 @@ OUTPUT = (
 """The settings of poses in the order of the core, see pose.h."""
 MOST_ROLES = 8
 """So many roles a joint clip may have in the core: CDB_MOST_ROLES in types.h."""
+TAG = "g="
 Part = NDArray[Any] | bytes | None
 
 
@@ -67,14 +69,20 @@ class TableFile:
     assets: Sequence[str]
     """Those of its rows."""
     own_facts: Mapping[str, str] = field(default_factory=dict)
-    """The facts that a character adds: "s" its speed, "d" the direction of its stick, "t" its turn."""
+    """The facts that a character adds: "s" its speed, "d" the direction of its stick, "t" its turn, the letters of `FACTS` of what
+    plays (characters/played.py), and "g=TAG" for a tag of its frame."""
     mirror: Mapping[str, str] = field(default_factory=dict)
     """How facts change in a mirror: "n" negated, "p=NAME" that of another condition, "v=1 0" enum values by their numbers."""
 
     @property
-    def parts(self) -> list[bytes]:
-        """What a bundle says of facts."""
-        own = [f"{letter}{name}" for name, letter in self.own_facts.items()]
+    def tags(self) -> list[str]:
+        """The tags that it asks for."""
+        return [text[2:] for text in self.own_facts.values() if text.startswith(TAG)]
+
+    def parts(self, tags: Sequence[str]) -> list[bytes]:
+        """What a bundle with these tags says of facts."""
+        numbers = {f"{TAG}{tag}": f"={number}" for number, tag in enumerate(tags)}
+        own = [f"{text[0]}{name}{numbers.get(text, '')}" for name, text in self.own_facts.items()]
         mirrored = [f"{text[0]}{name}{text[1:]}" for name, text in self.mirror.items()]
         return [_texts(own), _texts(mirrored)]
 
@@ -122,9 +130,10 @@ def bundle_of(
     _check(players, searchers)
     bundle, numbers, names = Bundle(), {name: i for i, name in enumerate(tables)}, list[str]()
     joint = {name: (each, searcher.selector) for searcher in searchers.values() for name, each in searcher.databases.items()}
+    tags = list(dict.fromkeys(tag for table in tables.values() for tag in table.tags))
     banks = moving_alike({name: bank for player in players.values() for name, bank in (player.banks or {}).items()})
     for number, (name, table) in enumerate(tables.items()):
-        bundle.add(TABLE, number, [table.octets, _texts([name]), *table.parts])
+        bundle.add(TABLE, number, [table.octets, _texts([name]), *table.parts(tags)])
     for number, (name, player) in enumerate(players.items()):
         banks_of, chooser = player.banks or {}, player.controller.chooser
         more = [each for each in joint if each not in chooser.names and (player.banks is None or each in banks_of)]
@@ -135,9 +144,9 @@ def bundle_of(
                 names.append(database)
                 bank, number_of = banks.get(database), len(names) - 1
                 if database in more:
-                    _add_joint(bundle, number_of, *joint[database], database, bank, tables.get(of))
+                    _add_joint(bundle, number_of, *joint[database], database, bank, tables.get(of), tags)
                 else:
-                    _add_database(bundle, number_of, chooser, database, bank, tables.get(of), player.ends.get(database))
+                    _add_database(bundle, number_of, chooser, database, bank, tags, tables.get(of), player.ends.get(database))
             at = names.index(database)
             entries.append((at, at if database in banks_of else -1, numbers.get(of, -1)))
         own = [banks[each] for each in (*chooser.names, *more) if each in banks_of]
@@ -159,8 +168,6 @@ def _check(players: Mapping[str, Played], searchers: Mapping[str, JointSearcher]
     ]
     for name, player in players.items():
         chooser, place = player.controller.chooser, Place(f"[controllers.{name}]")
-        if player.controller.settings.variation is not None:
-            faults.append(Fault("a bundle has no random choice among near ties.", "no variation_within", place=place))
         faults += [
             Fault(f"the database {in_quotes(missing)} is not loaded.", "databases that are there", place=place)
             for missing, database in zip(chooser.names, chooser.databases, strict=True)
@@ -181,6 +188,7 @@ def _add_joint(
     name: str,
     bank: PoseBank | None,
     table: TableFile | None,
+    tags: Sequence[str],
 ) -> None:
     """A database, which of its ranges belong together, and what a joint search of it reads."""
     boxes, database = boxes_of(joint), selector.databases[name]
@@ -194,7 +202,7 @@ def _add_joint(
     biases = chosen.range_biases, chosen.kinds.biases, chosen.kinds.allowed
     parts = [_texts(joint.roles), joint.ranges, *searched, *weights, *biases, database.marks.warps, joint.mirrored, *rows]
     bundle.add(JOINT, number, parts)
-    _add_database(bundle, number, Chooser(Selector([Entry(name, database)]), ControllerSettings()), name, bank)
+    _add_database(bundle, number, Chooser(Selector([Entry(name, database)]), ControllerSettings()), name, bank, tags)
 
 
 def _add_database(
@@ -203,13 +211,14 @@ def _add_database(
     chooser: Chooser,
     name: str,
     bank: PoseBank | None,
+    tags: Sequence[str],
     table: TableFile | None = None,
     ends: Floats | None = None,
 ) -> None:
     at = chooser.names.index(name)
     database = chooser.databases[at]
     assert database is not None, "it was checked"
-    _, starts, stops, same, looping, root, marks, weights, rate, _, _, *rest = chooser.part(
+    _, starts, stops, same, _, looping, root, marks, weights, rate, _, _, *rest = chooser.part(
         chooser.selector.entries[at], database, chooser.rates[at]
     )
     *arrays, kinds, n_frames, n_kinds, offset, scale, channels, channel_weights, roots = database.frame_parts
@@ -220,11 +229,12 @@ def _add_database(
         row_starts, row_numbers, mirrored, _ = chooser.rows_of(name, table.assets)
         rows = mirrored, row_starts, row_numbers
     measures = kinds, offset, scale, channels, channel_weights, roots
-    nodes = () if ends is None else (database.marks.warps, ends)
+    nodes = (None, None) if ends is None else (database.marks.warps, ends)
     played = starts, stops, same, looping, root, marks, weights, own
     texts = _texts(database.assets), *rows, _texts([name])
     levels, events = _levels(database), _events(database)
-    bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, *texts, *levels, *events, *nodes])
+    more = asset_keys(database.assets), b"".join(database.marks.kinds_with(tag).tobytes() for tag in tags)
+    bundle.add(DATABASE, number, [*arrays, *measures, *played, ranges, *texts, *levels, *events, *nodes, *more])
     bundle.add(TAGS, number, [_texts(database.marks.tags), database.marks.kind_tags])
     if bank is not None:
         *frames, bank_rate = bank.frame_parts(bank.steps)
@@ -233,7 +243,7 @@ def _add_database(
 
 def _controller(name: str, player: Played, entries: list[tuple[int, int, int]], banks: list[PoseBank]) -> list[Part]:
     chooser, body = player.controller.chooser, Steered()
-    settings, shared = chooser.settings, chooser.shared(None, None)
+    settings, shared, varies = chooser.settings, chooser.shared(None, None), chooser.settings.variation
     biases = chooser.ranges(None, 1)[1][0]
     thresholds = np.array([np.nan if each.threshold is None else each.threshold for each in chooser.selector.entries], np.float64)
     bars = np.array([settings.bar_of(each) for each in chooser.databases if each is not None], np.float64)
@@ -241,7 +251,8 @@ def _controller(name: str, player: Played, entries: list[tuple[int, int, int]], 
         [
             chooser.n_played, settings.search_every_s, settings.jump_threshold_s, settings.history_s, settings.min_play_rate,
             settings.max_play_rate, settings.grace_s, settings.until_natural, player.banks is not None, body.velocity_halflife_s,
-            player.schema.rate, settings.settle_s, settings.asset_history_s,
+            player.schema.rate, settings.settle_s, settings.asset_history_s, varies is not None, chooser.n_recent,
+            0.0 if varies is None else varies.within,
         ],
         np.float64,
     )  # fmt: skip

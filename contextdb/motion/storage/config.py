@@ -230,7 +230,7 @@ class ControllerOptions(TypedDict, total=False):
     """What a controller is given next to its selector and settings."""
 
     recorder: Recorder | None
-    rng: Rng | None
+    rng: Rng | int | None
     clock: Clock | None
 
 

@@ -4,12 +4,11 @@ First every recorded search is repeated as it was, and the choices that differ a
 closed loop: the wished path, the facts and the valid assets of each update stay as they were recorded, what plays follows from the
 new choices, and so does the pose in the query, wherever the recorded one was that of the frame that would play on. Between two
 recorded searches the valid assets are those of the first of them, unless their table is repeated. What varies at random is drawn
-from a generator of its own, so that a session with variation is compared with itself run again, not with the recording.
+from a seed of its own, so that a session with variation is compared with itself run again, not with the recording.
 """
 
 from __future__ import annotations
 
-import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -144,7 +143,7 @@ class _Runner:
             Entry(each.database, reasked.databases.get(each.database), reasked.thresholds.get(each.database, each.threshold))
             for each in first.choice.searches
         ]
-        controller = Controller(Selector(entries, tags), first.inputs.settings, rng=random.Random(0))
+        controller = Controller(Selector(entries, tags), first.inputs.settings)
         return cls(reasked, controller, _are_of_frames(reasked, decisions))
 
     @cached_property

@@ -11,7 +11,9 @@
  * A actors, K roles, F features. Several databases are searched in order; one under its threshold wins outright. On a tie the earlier
  * database wins, then the lowest frame, then the first cast. */
 
+#ifndef CDBM_CASTS_AT_ONCE
 #define CDBM_CASTS_AT_ONCE 32       /* so many casts are compared together, so that the room stays small */
+#endif
 
 typedef struct cdbm_actor {         /* somebody who may take part */
     const double *query;            /* [F] the pose and path, in the units of the schema of the databases */
@@ -155,11 +157,11 @@ static inline int cdbm_ask_for_casts(const cdbm_player *player, size_t table, co
     const cdbm_asked *asked = &together->tables[table];
     const cdb_any *any = player->opened[table];
     const cdb_schema *schema = &any->schema;
-    size_t n_words = any->table.n_words, n_rows = any->table.n_rows, n = asked->facts ? asked->n_offers : 0, i, k;
+    size_t n_words = any->table.n_words, n_rows = any->table.n_rows, n = asked->facts && asked->offers ? asked->n_offers : 0, i, k;
     cdb_fact *facts = (cdb_fact *)cdbm_part(room, (n + 1) * schema->n_conditions * sizeof(cdb_fact)), own[CDB_MOST_FACTS];
     cdb_actor *offers = (cdb_actor *)cdbm_part(room, n * sizeof(cdb_actor));
-    const cdb_fact *derived;
-    int all[2 * CDB_MOST_ROLES];
+    const cdb_fact *derived = facts;
+    int cast[CDB_MOST_ROLES], n_cast = 0;
     memset(to, 0, sizeof *to);
     to->rows = (uint64_t *)cdbm_part(room, n_words * 8), to->left = (uint64_t *)cdbm_part(room, n_words * 8);
     to->masks = (uint64_t *)cdbm_part(room, n * n_words * 8), to->left_masks = (uint64_t *)cdbm_part(room, n * n_words * 8);
@@ -186,15 +188,17 @@ static inline int cdbm_ask_for_casts(const cdbm_player *player, size_t table, co
         return 1;
     }
     if (cdb_cast(&any->table, any->columns, schema, facts, together->unknown, offers, n, to->masks, to->rows, n_words, together->fault) != CDB_OK) return -2;
-    for (k = 0; k < n_roles; k++) all[k] = to->roles[k] = cdb_role_number(&any->table, roles[k]);
+    for (k = 0; k < n_roles; k++) to->roles[k] = cdb_role_number(&any->table, roles[k]);
     for (i = 0; i < n; i++) {
-        for (k = 0; k < n_roles + to->n_others && all[k] != offers[i].role; k++) {}
-        if (k == n_roles + to->n_others && to->n_others < CDB_MOST_ROLES) all[k] = to->others[to->n_others++] = offers[i].role;
+        for (k = 0; k < n_roles && to->roles[k] != offers[i].role; k++) {}
+        if (k < n_roles) continue;
+        for (k = 0; k < to->n_others && to->others[k] != offers[i].role; k++) {}
+        if (k == to->n_others && k < CDB_MOST_ROLES) to->others[to->n_others++] = offers[i].role;
     }
     if (!to->costs) return 1;
-    derived = facts;
+    if (cdbi_find_cast(&any->table, schema, facts, offers, n, cast, &n_cast, together->fault) != CDB_OK) return -2;
     if (cdbi_derived(&any->table, schema, &derived, own, together->unknown, together->fault) != CDB_OK) return -2;
-    cdbm_soft_costs(any, derived, together->unknown, all, n_roles + to->n_others, 1, to->costs);
+    cdbm_soft_costs(any, derived, together->unknown, cast, (size_t)n_cast, 1, to->costs);
     for (i = 0; i < n; i++) cdbm_soft_costs(any, offers[i].facts, together->unknown, &offers[i].role, 1, 0, to->own + i * n_rows);
     return 1;
 }

@@ -96,6 +96,13 @@ public:
         return cdbm_enter_one(Crowd.get(), Character, Database, 0.0 - Y / 100.0, X / 100.0, -CDBO_PI / 180.0 * Yaw, MostCost) <= MostCost;
     }
 
+    /** Let some characters play a clip of several roles together from the next update on, of joint databases by their name: the clip, frame
+     * and cast that cost least, where that is at most MostCost. False where none plays. */
+    bool Meet(const char* Joint, const std::vector<std::size_t>& Characters, double MostCost)
+    {
+        return cdbm_meet_ones(Crowd.get(), Joint, Characters.data(), Characters.size(), MostCost) <= MostCost;
+    }
+
     /** Update all: nullptr, or what was wrong; all then stand where they stood. */
     const char* Update(double Seconds) { return cdbm_update_crowd(Crowd.get(), Seconds, nullptr); }
 

@@ -13,6 +13,34 @@ static void set_fact(cdbm_crowd *crowd, size_t i, const char *name, const char *
     }
 }
 
+/* What is refused: no such set, an actor cast twice, a tag that no markup knows, too little room. */
+static int are_refused(const cdbm_crowd *crowd)
+{
+    static const int64_t casts[] = {0, 1, 1, 1};
+    static const char *const unknown[] = {"Unknown"};
+    const cdbm_player *player = &crowd->player;
+    cdbm_together together;
+    cdbm_joint_hit hit;
+    cdbm_actor actors[2];
+    cdbm_tags tags;
+    double queries[2][64];
+    cdbm_room room = crowd->room;
+    size_t i;
+    memset(&together, 0, sizeof together), memset(&tags, 0, sizeof tags);
+    if (player->controller.n_features > 64) return 0;
+    for (i = 0; i < 2; i++) cdbm_take_part(player, crowd->states + i * cdbm_state_width(player), queries[i], &actors[i]);
+    together.actors = actors, together.n_actors = 2, together.set = 7;
+    if (cdbm_choose_together(player, &together, &hit, room) != -1) return 0;
+    together.set = (size_t)cdbm_set_number(player, "greetings"), together.casts = casts, together.n_casts = 2;
+    if (cdbm_choose_together(player, &together, &hit, room) != -1) return 0;
+    together.n_casts = 1;
+    if (cdbm_choose_together(player, &together, &hit, room) != 1 || hit.cast[0] != 0 || hit.cast[1] != 1 || hit.row != -1) return 0;
+    tags.include = unknown, tags.n_include = 1, together.tags = &tags;
+    if (cdbm_choose_together(player, &together, &hit, room) != -3) return 0;
+    room.left = 1000, together.tags = NULL;
+    return cdbm_choose_together(player, &together, &hit, room) == 0;
+}
+
 int main(int n_words, char **words)
 {
     static const size_t both[] = {0, 1}, twice[] = {1, 1}, others[] = {0, 7};
@@ -31,6 +59,7 @@ int main(int n_words, char **words)
         if (cdbm_update_crowd(crowd, 1.0 / 30.0, NULL)) return 2;
     if (cdbm_meet_ones(crowd, "no such", both, 2, 1e9) <= 1e9 || cdbm_meet_ones(crowd, "greetings", twice, 2, 1e9) <= 1e9) return 3;
     if (cdbm_meet_ones(crowd, "greetings", others, 2, 1e9) <= 1e9 || cdbm_meet_ones(crowd, "greetings", both, 9, 1e9) <= 1e9) return 4;
+    if (!are_refused(crowd)) return 8;
     cost = cdbm_meet_ones(crowd, "greetings", both, 2, 0.0); /* dearer than that: it is not played */
     if (!(cost > 0.0) || crowd->inputs[0].one_off || cdbm_meet_ones(crowd, "greetings", both, 2, cost) != cost) return 5;
     printf("%.17g\n", cost);

@@ -112,7 +112,7 @@ MEETING_COLUMNS = {
     "rain": ["Any", "No ~0.25", "Any", "Any", "Yes", "Any"],
     "Host.mood": ["glad", "Any", "cross ~0.5", "glad ~0.25", "Any", "cross"],
     "Guest.side": ["Any", "<1", "<0", ">0 ~0.125", "Any", "Any"],
-    "Judge.awake": ["Any", "Any", "Any", "Any", "Yes", "Any"],
+    "Judge.awake": ["Any", "Yes ~0.375", "Any", "Any", "Yes", "Any"],
 }
 
 
@@ -183,9 +183,9 @@ def programs(tmp_path_factory):
     """The program, as each compiler makes it with little optimisation, with much, and under sanitizers."""
     folder, first = tmp_path_factory.mktemp("character"), all_compilers()[0]
     (folder / "contextdb_motion.h").write_text(header(), encoding="ascii")
-    commands = variants(("-O0",), ("-O3",) if IS_FULL else ("-O0", "-DCDBM_NARROW")) + [
-        (*first, *own) for own in [sanitizers(*first)] if own
-    ]
+    commands = variants(
+        ("-O0",), ("-O3", "-DCDBM_CASTS_AT_ONCE=2") if IS_FULL else ("-O0", "-DCDBM_NARROW", "-DCDBM_CASTS_AT_ONCE=2")
+    ) + [(*first, *own) for own in [sanitizers(*first)] if own]
     options = ["-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wno-unused-function"]
     made = [
         compiled([*command, *options], PROGRAMS / "character.c", folder / f"character{number}", folder, "-lm")

@@ -1,4 +1,4 @@
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -288,37 +288,24 @@ class Poses:
     def width(self) -> int: ...
     def begin(self, row: NDArray[np.float64], /) -> None:
         """Write the row of a character that has not displayed anything yet."""
-    def receive(
-        self,
-        rows: NDArray[np.float64],
-        plays: NDArray[np.float64],
-        dt_s: float,
-        given: NDArray[np.float64],
-        seams: NDArray[np.float64],
-        displayed: NDArray[np.float64],
-        /,
-    ) -> int:
-        """Write what happens to characters by what was decided, and what is displayed then; gives how many moments at seams there
-        are, two for each."""
     def update(
         self,
         before: NDArray[np.float64],
-        given: NDArray[np.float64],
+        plays: NDArray[np.float64],
         places: NDArray[np.float64] | None,
-        seams: NDArray[np.float64] | None,
         dt_s: float,
+        ask: Callable[[tuple[tuple[int, float, float], ...]], Sequence[tuple[float, float, float]]] | None,
         after: NDArray[np.float64],
+        displayed: NDArray[np.float64],
         roots: NDArray[np.float64],
-        rotations: NDArray[np.float64],
-        translations: NDArray[np.float64],
-        positions: NDArray[np.float64],
+        made: NDArray[np.float64],
         contacts: NDArray[np.bool_],
-        points: NDArray[np.float64] | None,
-        below: NDArray[np.float64] | None,
+        moves_body: NDArray[np.bool_],
         /,
-    ) -> None:
-        """Put characters through all stages: with `points`, which are written, through those before the ground, and with what is
-        `below` them through the others."""
+    ) -> bool:
+        """Put characters through all stages by what was decided; gives whether all play something. `ask` gives the ground at
+        points, each with the number of its character. `made` is what happened to each, the moments at seams, two for each,
+        rotations, translations and positions, one array after the other."""
 
 def pose_columns() -> dict[str, int]:
     """Where each single number of a character's row is, by its name."""
@@ -499,12 +486,13 @@ def fill_plays(
     banks: NDArray[np.int64],
     ranges: NDArray[np.int64],
     displayed: NDArray[np.float64],
-    gives: NDArray[np.bool_],
+    grounds: object,
     plays: NDArray[np.float64],
     /,
 ) -> bool:
     """Write what poses are made of, by what was decided; gives whether the banks have all that plays. `banks` is that of each
-    database, `ranges` from `starts[d]` on the range there of each of its ranges, below 0 for none."""
+    database, `ranges` from `starts[d]` on the range there of each of its ranges, below 0 for none; `grounds` is for all, a tuple
+    for each."""
 
 def search_joint(*arguments: NDArray[Any]) -> None:
     """search_joint(blocks, rank, boxes, lows, highs, channels, weights, ranges, firsts, relative, relative_lows, relative_highs,

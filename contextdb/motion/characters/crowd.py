@@ -173,10 +173,10 @@ class Crowd(ListSequence[Character]):
                 numbers = [of_updates[k] for k in alike]
                 part = updates if len(alike) == len(of_updates) else updates._replace(decisions=updates.decisions[alike])
                 streams = PoseStreams(stream for i in numbers if (stream := self[i].stream) is not None)
-                below = [grounds[i] for i in numbers]
+                below = tuple(grounds[i] for i in numbers)
                 own = decisions if len(numbers) == len(self) else [decisions[i] for i in numbers]
                 groups.append((numbers, streams, *streams.updated(part, own, dt, places[numbers], below if any(below) else None)))
-        for numbers, streams, poses, rows, moves in groups:
+        for numbers, streams, rows, poses, moves in groups:
             streams.go_on(rows)
             if len(numbers) == len(self):
                 return poses, poses.roots, moves

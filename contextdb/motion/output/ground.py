@@ -68,16 +68,13 @@ def below_many(ground: ManyGround, points: Sequence[tuple[float, float]]) -> lis
     return [(height, x, z) for height, (x, z) in zip(heights.tolist(), (share[:, None] * rise).tolist(), strict=True)]
 
 
-Grounds = Sequence[Ground | None] | ManyGround
+Grounds = tuple[Ground | None, ...] | ManyGround
+Points = Sequence[tuple[int, float, float]]
+"""The number of a character, x and z."""
 
 
-def below_all(grounds: Grounds, points: Floats) -> Floats:
-    """Height and rise of the ground at the points of N characters [N, K, 2], those that are NaN left out: [N, K, 3]."""
-    rows: list[list[list[float]]] = points.tolist()
-    if isinstance(grounds, Sequence):
-        each = zip(grounds, rows, strict=True)
-        heights = [[LEVEL if ground is None or x != x else below(ground, x, z) for x, z in own] for ground, own in each]
-    else:
-        flat = iter(below_many(grounds, [(x, z) for own in rows for x, z in own if x == x]))
-        heights = [[next(flat) if x == x else LEVEL for x, _ in own] for own in rows]
-    return np.array(heights, np.float64)
+def below_all(grounds: Grounds, points: Points) -> list[Triple]:
+    """Height and rise of the ground at points of characters."""
+    if isinstance(grounds, tuple):
+        return [below(grounds[i], x, z) for i, x, z in points]
+    return below_many(grounds, [(x, z) for _, x, z in points]) if points else []

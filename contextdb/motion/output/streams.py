@@ -102,19 +102,16 @@ class PoseStreams(ListSequence[PoseStream]):
         if len(decided) != len(self):
             raise ContextError(Fault(f"{plural(len(decided), 'decision')} for {plural(len(self), 'character')}.", "one for each"))
         places, grounds, rows = self._places(bodies, decided), self._grounds(ground), self._rows()
-        rows, poses = self._pipeline.update(rows, decided, self._pipeline.plays_of(rows, decided, grounds), dt, places, grounds)
+        rows, poses, _ = self._pipeline.update(rows, decided, self._pipeline.plays_of(rows, decided, grounds), dt, places, grounds)
         self.go_on(rows)
         return poses
 
     def updated(
         self, updates: Updates, decisions: list[Decision], dt: float, places: Floats, grounds: Grounds | None
-    ) -> tuple[CrowdPoses, Rows, Flags]:
+    ) -> tuple[Rows, CrowdPoses, Flags]:
         """The poses after the decisions of some updates, unchecked; the streams stand where they stood until `go_on` is given the
         rows. And whether the clip alone moves the body of each."""
-        rows, own = self._rows(), self._pipeline
-        plays = own.plays_in(rows, updates, decisions, grounds)
-        after, poses = own.update(rows, decisions, plays, dt, places, grounds)
-        return poses, after, own.moves_body(plays)
+        return self._pipeline.decided(self._rows(), updates, decisions, dt, places, grounds)
 
     def go_on(self, rows: Rows) -> None:
         """Go on from some rows, one for each."""
@@ -145,7 +142,7 @@ class PoseStreams(ListSequence[PoseStream]):
             and bodies.dtype == np.float64
             and np.isfinite(bodies).all()
         ):
-            return bodies
+            return np.ascontiguousarray(bodies)
         places = []
         for i, body in enumerate(bodies):
             try:
@@ -162,4 +159,4 @@ class PoseStreams(ListSequence[PoseStream]):
         for i, each in enumerate(ground):
             if each is not None and not callable(each):
                 raise ContextError(Fault(f"the ground is {each!r}.", "a function, or None", place=Place(f"character {i}")))
-        return ground if any(each is not None for each in ground) else None
+        return tuple(ground) if any(each is not None for each in ground) else None

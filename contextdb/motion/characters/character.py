@@ -16,7 +16,7 @@ import math
 import random
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from typing import Unpack
+from typing import Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +30,7 @@ from contextdb.motion.characters import walks
 from contextdb.motion.characters.facts import FACTS, FactOf, Ground, Moment
 from contextdb.motion.characters.played import Played
 from contextdb.motion.characters.project import HasTables, Parts
-from contextdb.motion.characters.tables import Facts, OwnFacts, Tables, Unknown
+from contextdb.motion.characters.tables import Facts, OwnFacts, Table, Tables, Unknown
 from contextdb.motion.characters.updates import UNKNOWN, Options, Paths, Step, Updated
 from contextdb.motion.characters.walks import WishedPaths
 from contextdb.motion.clips.quaternions import Floats
@@ -231,7 +231,7 @@ class Character:
     @property
     def _row(self) -> Floats:
         """The character's walk: [1, W]."""
-        return walks.fitted(self.schema.ways, self._rows[self._at : self._at + 1])
+        return walks.fitted(self.schema.ways, self._rows if len(self._rows) == 1 else self._rows[self._at : self._at + 1])
 
     @property
     def root(self) -> RootMotion:
@@ -316,11 +316,12 @@ class Character:
             Facts that a table refuses, or an argument that cannot be used. The character then stands where it stood.
         """
         step = self._step(dt, stick, facts, facing, body, path)
+        is_plain = not options
         if "valid" not in options:
             options["valid"] = self._valid(step.facts)
         on, own, before = step.on, [self.controller], self.controller.place
-        asked, contexts = Asked.of_one(**options), [step.facts or None]
-        decided = update_all(own, step.dt_s, on.queries, asked, contexts, on.places, on.moved)
+        asked = Asked.plain(options["valid"], 1) if is_plain else Asked.of_one(**options)
+        decided = update_all(own, step.dt_s, on.queries, asked, [step.facts or None], on.places, on.moved)
         return self._answer(step, decided, before)
 
     # ---- over a network
@@ -396,7 +397,10 @@ class Character:
             facing, body = None if math.isnan(heading) else heading, walks.body_of(rows, i)
             moment = Moment(dt, (x, z), facing, body, self.playing, self._played())
             own |= {name: of(moment) for name, of in asked.others.items() if name not in given}
-        return {**own, **given} if own else given
+        if not own:
+            return given
+        own.update(given)
+        return own
 
     def _played(self) -> Played | None:
         """What plays, with what it is of."""
@@ -421,10 +425,11 @@ class Character:
 
     def _valid(self, facts: Facts) -> OfValid | None:
         """What the tables allow with some facts."""
-        answers: dict[int, Answer] = {
-            id(table): asking.answer(table, facts, self.unknown) for table in asking.each_of(self._tables)
-        }
-        return asking.valid_of(self._tables, answers)
+        tables = self._tables
+        if not isinstance(tables, dict):
+            return None if tables is None else asking.answer(cast("Table", tables), facts, self.unknown)
+        answers: dict[int, Answer] = {id(table): asking.answer(table, facts, self.unknown) for table in asking.each_of(tables)}
+        return asking.valid_of(tables, answers)
 
     def _answer(self, step: Step, decided: Decided, before: ControllerPlace) -> Updated:
         """The pose after a decision; `before` is where the controller stood."""

@@ -93,6 +93,9 @@ class Plays(NamedTuple):
         return None if row < 0 else RowPlay.of(self.rows[row].tolist())
 
 
+NO_PLAYS = None, None
+
+
 class Ranges(NamedTuple):
     """Which ranges may play in each of n updates, bool [n or 1, R], their biases, float64 [n or 1, R], and how they play; None
     where no row says."""
@@ -148,23 +151,16 @@ class Updates(NamedTuple):
 
     def run(self, parts: int) -> None:
         """Do some steps of the updates, on as many cores as this process may use."""
-        given, n, done = self.given, len(self.before), list[bool]()
-        what = (
-            given.ranges,
-            given.range_biases,
-            *given.shared[:5],
-            given.among,
-            given.urgent,
-            *(given.plays or (None, None)),
-            given.wide,
-            given.to_event,
-            given.event_s,
-        )
-        arrays = (self.before, self.moved, given.queries, given.dt_s, *what, self.after, self.decisions, self.found)
+        given, n, core, done = self.given, len(self.before), self.chooser.core, list[bool]()
+        arrays = (
+            self.before, self.moved, given.queries, given.dt_s, given.ranges, given.range_biases, *given.shared[:5],
+            given.among, given.urgent, *(given.plays or NO_PLAYS), given.wide, given.to_event, given.event_s,
+            self.after, self.decisions, self.found,
+        )  # fmt: skip
         if n < 2 * THREAD_QUERIES:
-            done.append(self.chooser.core.update(parts, 0, n, *arrays))
+            done.append(core.update(parts, 0, n, *arrays))
         else:
-            in_blocks(n, lambda start, stop: done.append(self.chooser.core.update(parts, start, stop, *arrays)))
+            in_blocks(n, lambda start, stop: done.append(core.update(parts, start, stop, *arrays)))
         if not all(done):
             for query in given.queries:
                 for database in self.chooser.selector.databases.values():
@@ -391,6 +387,11 @@ class Chooser:
                     self._shared.clear()
                 self._shared[tags] = known  # type: ignore[index]
         return known
+
+    @cached_property
+    def nothing_more(self) -> tuple[Shared, Flags]:
+        """What characters may choose from where they are asked with nothing but `valid`, and the databases of the moment."""
+        return self.shared(None, None), self.among(None)
 
     def among(self, among: Among | None) -> Flags:
         """The databases of the moment: bool [1, D]."""

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -92,15 +93,26 @@ class Asked:
         """What one is asked with."""
         return cls(valid, [tags], [bias], [among], [penalties], [force], [interrupt], [event])
 
+    @classmethod
+    def plain(cls, valid: OfValidForMany | None, n: int) -> Asked:
+        """What n are asked with where nothing else is given."""
+        nothing, no = _nothing(n)
+        return cls(valid, nothing, nothing, nothing, nothing, no, no, nothing)
+
     @property
     def is_plain(self) -> bool:
         """Whether nothing but `valid` is given."""
         given = self.tags, self.bias, self.among, self.penalties, self.event
-        return not (any(self.force) or any(self.interrupt) or any(one is not None for each in given for one in each))
+        return not any(self.force) and not any(self.interrupt) and all(each.count(None) == len(each) for each in given)
 
     def options(self, i: int) -> SearchOptions:
         """Those of one, checked."""
         return SearchOptions(None, self.tags[i], None, self.bias[i], self.among[i], None, self.penalties[i])
+
+
+@lru_cache
+def _nothing(n: int) -> tuple[Sequence[None], Sequence[bool]]:
+    return (None,) * n, (False,) * n
 
 
 class Decided(NamedTuple):
@@ -197,7 +209,7 @@ class Controller:
     @property
     def _row(self) -> Floats:
         """The controller's row: [1, W]."""
-        return self._rows[self._at : self._at + 1]
+        return self._rows if len(self._rows) == 1 else self._rows[self._at : self._at + 1]
 
     @property
     def row(self) -> Floats:
@@ -405,18 +417,19 @@ def prepared(
 ) -> Updates:
     """The updates of controllers that go together, whose numbers among all are these, before their first step; with what has
     `moved` where that is known."""
-    chooser, n, rows, is_plain = own[0].chooser, len(own), rows_of(own), asked.is_plain
+    chooser, n, rows = own[0].chooser, len(own), rows_of(own)
     if moved is None:
         moved = chooser.move(rows, dt_s)[0]
     valid: Any = asked.valid
     if valid is not None and n < len(asked.tags):
         valid = [own_valid(valid, i) for i in numbers]
-    chooser.check_names(NOTHING_MORE if is_plain else asked.options(numbers[0]), valid)
+    if not (is_plain := asked.is_plain) or not hasattr(valid, "table_assets"):
+        chooser.check_names(NOTHING_MORE if is_plain else asked.options(numbers[0]), valid)
     flags, biases, plays = chooser.ranges(valid, n)
     wide = _wide(chooser, moved, flags, valid, asked, numbers) if widens(valid) else None
-    wanted = np.ascontiguousarray(queries[:, : chooser.n_features])
-    shared, among, urgent = chooser.shared(None, None), chooser.among(None), np.zeros(n, np.uint8)
-    given = Given(wanted, dt_s, flags, biases, shared, among, urgent, wide, plays)
+    if queries.shape[1] != chooser.n_features or not queries.flags.c_contiguous:
+        queries = np.ascontiguousarray(queries[:, : chooser.n_features])
+    given = Given(queries, dt_s, flags, biases, *chooser.nothing_more, np.zeros(n, np.uint8), wide, plays)
     if not is_plain:
         given = _with_more(given, chooser, moved, asked, numbers)
     found = np.empty((n, len(chooser.names), 3))
@@ -461,6 +474,8 @@ def _run(updates: Updates, own: Sequence[Controller]) -> float:
 
 def rows_of(controllers: Sequence[Controller]) -> Floats:
     """The rows of controllers of one selector and settings: [Q, W]."""
+    if len(controllers) == 1:
+        return controllers[0]._row
     first = controllers[0]._rows
     if len(first) == len(controllers) and all(each._rows is first and each._at == i for i, each in enumerate(controllers)):
         return first

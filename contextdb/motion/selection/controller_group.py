@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -191,9 +192,9 @@ class ControllerGroup(ListSequence[Controller]):
         moved: Floats,
     ) -> Decided:
         """The same where all but `event` is known to be right, with the places of bodies [Q, 3] and what has moved [Q, 16]."""
-        nothing, no, events = [None] * len(self), [False] * len(self), _each_event(event, len(self))
-        asked = Asked(valid, nothing, nothing, nothing, nothing, no, no, events)
+        asked = Asked.plain(valid, len(self))
         if event is not None:
+            asked = replace(asked, event=_each_event(event, len(self)))
             self._check(asked)
         return update_all(self, dt_s, queries, asked, contexts, places, moved)
 

@@ -307,6 +307,10 @@ class Poses:
         points, each with the number of its character. `made` is what happened to each, the moments at seams, two for each,
         rotations, translations and positions, one array after the other."""
 
+def risen(answer: object, steepest: float, /) -> tuple[float, float, float] | None:
+    """A ground's answer (height, (nx, ny, nz)) as its height and by how much it rises along x and z; None for one that is about as
+    steep, that points down, or that is not made of floats in tuples."""
+
 def pose_columns() -> dict[str, int]:
     """Where each single number of a character's row is, by its name."""
 

@@ -31,7 +31,7 @@ from contextdb.motion.characters.facts import FACTS, FactOf, Ground, Moment
 from contextdb.motion.characters.played import Played
 from contextdb.motion.characters.project import HasTables, Parts
 from contextdb.motion.characters.tables import Facts, OwnFacts, Table, Tables, Unknown
-from contextdb.motion.characters.updates import UNKNOWN, Options, Paths, Step, Updated
+from contextdb.motion.characters.updates import UNKNOWN, More, Options, Paths, Step, Updated
 from contextdb.motion.characters.walks import WishedPaths
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
@@ -41,7 +41,7 @@ from contextdb.motion.nodes.warping import Target
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.ground import Ground as HeightOf
 from contextdb.motion.output.stream import PoseStream
-from contextdb.motion.selection.controller import Asked, Clock, Controller, Decided, update_all
+from contextdb.motion.selection.controller import Asked, Clock, Controller, Decided, nothing_asked, update_all
 from contextdb.motion.selection.controller import Place as ControllerPlace
 from contextdb.motion.selection.decision import Playing, plays
 from contextdb.motion.selection.events import Event
@@ -316,12 +316,10 @@ class Character:
             Facts that a table refuses, or an argument that cannot be used. The character then stands where it stood.
         """
         step = self._step(dt, stick, facts, facing, body, path)
-        is_plain = not options
-        if "valid" not in options:
-            options["valid"] = self._valid(step.facts)
+        valid = options.pop("valid") if "valid" in options else self._valid(step.facts)
         on, own, before = step.on, [self.controller], self.controller.place
-        asked = Asked.plain(options["valid"], 1) if is_plain else Asked.of_one(**options)
-        decided = update_all(own, step.dt_s, on.queries, asked, [step.facts or None], on.places, on.moved)
+        asked = Asked.of_one(**cast("More", options)) if options else nothing_asked(1)
+        decided = update_all(own, step.dt_s, on.queries, valid, asked, [step.facts or None], on.places, on.moved)
         return self._answer(step, decided, before)
 
     # ---- over a network
@@ -391,7 +389,9 @@ class Character:
     ) -> Facts:
         """The facts of the game and the character's own, whose walk is one of some rows."""
         asked = self._own_facts
-        own: dict[str, object] = {name: numbers[at] for name, at in asked.of_body.items()}
+        own: dict[str, object] = {}
+        for name, at in asked.of_body.items():
+            own[name] = numbers[at]
         if asked.others and any(name not in given for name in asked.others):
             x, z, heading = goal
             facing, body = None if math.isnan(heading) else heading, walks.body_of(rows, i)

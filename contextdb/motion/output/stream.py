@@ -108,6 +108,10 @@ class PoseStream:
         require_kind(other, PoseStream, "other", "a PoseStream")
         return self._pipeline.is_like(other._pipeline)
 
+    def kind(self) -> int:
+        """A number that only streams have which are like it."""
+        return id(self._pipeline)
+
     @property
     def state(self) -> PoseState:
         """Where the stream is, to come back to with `restore`."""

@@ -47,11 +47,18 @@ class PoseStreams(ListSequence[PoseStream]):
         self._items = require_many_of(streams, PoseStream, "streams", "a list of PoseStream")
         if not self._items:
             raise MotionError(Fault("there is no stream.", "at least one"))
-        if len(set(map(id, self._items))) < len(self._items):
-            raise MotionError(Fault("the same stream is there twice.", "one of its own for each, such as copy.copy(stream)"))
+        _check_each_once(self._items)
         self._pipeline = self._items[0]._pipeline
         if not all(stream.is_like(self._items[0]) for stream in self._items):
             raise MotionError(Fault("the streams have different banks or settings.", "streams of the same banks and settings"))
+
+    @classmethod
+    def of_like(cls, streams: list[PoseStream]) -> PoseStreams:
+        """Those of streams that are known to be like each other. Raises MotionError for the same one twice."""
+        _check_each_once(streams)
+        own = cls.__new__(cls)
+        own._items, own._pipeline = streams, streams[0]._pipeline
+        return own
 
     def __repr__(self) -> str:
         return f"<PoseStreams: {plural(len(self), 'character')}>"
@@ -120,10 +127,10 @@ class PoseStreams(ListSequence[PoseStream]):
 
     def _rows(self) -> Rows:
         """The rows of all: as the last update left them, unless a stream was elsewhere meanwhile."""
-        each = [stream._place for stream in self._items]
-        first = each[0][0]
-        if len(first) == len(each) and all(rows is first and at == i for i, (rows, at) in enumerate(each)):
+        first = self._items[0]._place[0]
+        if len(first) == len(self) and all(stream._rows is first and stream._at == i for i, stream in enumerate(self._items)):
             return first
+        each = [stream._place for stream in self._items]
         numbers, displayed = (np.array([getattr(rows, name)[at] for rows, at in each]) for name in ("numbers", "displayed"))
         return Rows(numbers, displayed, [rows.last[at] for rows, at in each])
 
@@ -160,3 +167,8 @@ class PoseStreams(ListSequence[PoseStream]):
             if each is not None and not callable(each):
                 raise ContextError(Fault(f"the ground is {each!r}.", "a function, or None", place=Place(f"character {i}")))
         return tuple(ground) if any(each is not None for each in ground) else None
+
+
+def _check_each_once(streams: list[PoseStream]) -> None:
+    if len(set(map(id, streams))) < len(streams):
+        raise MotionError(Fault("the same stream is there twice.", "one of its own for each, such as copy.copy(stream)"))

@@ -67,9 +67,8 @@ FORCE, INTERRUPT = 1, 2
 @quickly_made
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What n controllers are asked with beside their queries: one for each, and `valid` as for many."""
+    """What n controllers are asked with beside their queries and what is valid: one for each."""
 
-    valid: OfValidForMany | None
     tags: Sequence[OfTags | None]
     bias: Sequence[Mapping[str, ArrayLike] | None]
     among: Sequence[Among | None]
@@ -81,7 +80,6 @@ class Asked:
     @classmethod
     def of_one(
         cls,
-        valid: OfValid | None = None,
         tags: OfTags | None = None,
         bias: Mapping[str, ArrayLike] | None = None,
         penalties: OfPenalties | None = None,
@@ -91,19 +89,15 @@ class Asked:
         event: Event | None = None,
     ) -> Asked:
         """What one is asked with."""
-        return cls(valid, [tags], [bias], [among], [penalties], [force], [interrupt], [event])
-
-    @classmethod
-    def plain(cls, valid: OfValidForMany | None, n: int) -> Asked:
-        """What n are asked with where nothing else is given."""
-        nothing, no = _nothing(n)
-        return cls(valid, nothing, nothing, nothing, nothing, no, no, nothing)
+        return cls([tags], [bias], [among], [penalties], [force], [interrupt], [event])
 
     @property
     def is_plain(self) -> bool:
-        """Whether nothing but `valid` is given."""
-        given = self.tags, self.bias, self.among, self.penalties, self.event
-        return not any(self.force) and not any(self.interrupt) and all(each.count(None) == len(each) for each in given)
+        """Whether nothing is given."""
+        if self is nothing_asked(len(self.tags)):
+            return True
+        given = *self.tags, *self.bias, *self.among, *self.penalties, *self.event
+        return not any(self.force) and not any(self.interrupt) and given.count(None) == len(given)
 
     def options(self, i: int) -> SearchOptions:
         """Those of one, checked."""
@@ -111,8 +105,10 @@ class Asked:
 
 
 @lru_cache
-def _nothing(n: int) -> tuple[Sequence[None], Sequence[bool]]:
-    return (None,) * n, (False,) * n
+def nothing_asked(n: int) -> Asked:
+    """What n are asked with where nothing is given."""
+    nothing, no = (None,) * n, (False,) * n
+    return Asked(nothing, nothing, nothing, nothing, no, no, nothing)
 
 
 class Decided(NamedTuple):
@@ -323,8 +319,8 @@ class Controller:
             `body` is none.
         """
         wanted = self._checked(query)
-        asked = Asked.of_one(valid, tags, bias, penalties, among, force, interrupt, event)
-        return update_all([self], seconds_of(dt_s), wanted[None], asked, [context], [place_of(body)]).decisions[0]
+        asked = Asked.of_one(tags, bias, penalties, among, force, interrupt, event)
+        return update_all([self], seconds_of(dt_s), wanted[None], valid, asked, [context], [place_of(body)]).decisions[0]
 
     def _checked(self, query: ArrayLike) -> Floats:
         """The query as float64 [F], checked as long as any database is there to say how long it must be."""
@@ -375,6 +371,7 @@ def update_all(
     controllers: Sequence[Controller],
     dt_s: float,
     queries: Floats,
+    valid: OfValidForMany | None,
     asked: Asked,
     contexts: Sequence[Mapping[str, object] | None],
     bodies: Sequence[GroundPlace | None] | Floats,
@@ -385,10 +382,12 @@ def update_all(
     decisions: list[Any] = [None] * len(controllers)
     made = []
     for numbers in _together(controllers, asked):
-        is_all = len(numbers) == len(controllers)
-        own = controllers if is_all else [controllers[i] for i in numbers]
-        parts = (queries, moved) if is_all else (queries[numbers], None if moved is None else moved[numbers])
-        updates = prepared(own, dt_s, parts[0], asked, numbers, parts[1])
+        own, parts = controllers, (queries, valid, moved)
+        if len(numbers) < len(controllers):
+            own = [controllers[i] for i in numbers]
+            among = valid if valid is None else [own_valid(valid, i) for i in numbers]
+            parts = queries[numbers], among, None if moved is None else moved[numbers]
+        updates = prepared(own, dt_s, *parts, asked, numbers)
         search_us = _run(updates, own)
         made.append((numbers, updates))
         question = Question(queries, contexts, bodies, asked.force, asked.interrupt, asked.event, search_us)
@@ -405,6 +404,10 @@ def _together(controllers: Sequence[Controller], asked: Asked) -> list[list[int]
     if len(controllers) == 1:
         return [[0]]
     groups: dict[object, list[int]] = {}
+    if asked.is_plain:
+        for i, one in enumerate(controllers):
+            groups.setdefault(id(one.chooser), []).append(i)
+        return list(groups.values())
     each = zip(controllers, asked.tags, asked.bias, asked.event, strict=True)
     for i, (one, tags, bias, event) in enumerate(each):
         key = id(one.chooser), tags if isinstance(tags, TagFilter) else id(tags), id(bias), -1 if event is None else i
@@ -413,16 +416,19 @@ def _together(controllers: Sequence[Controller], asked: Asked) -> list[list[int]
 
 
 def prepared(
-    own: Sequence[Controller], dt_s: float, queries: Floats, asked: Asked, numbers: Sequence[int], moved: Floats | None = None
+    own: Sequence[Controller],
+    dt_s: float,
+    queries: Floats,
+    valid: Any,
+    moved: Floats | None,
+    asked: Asked,
+    numbers: Sequence[int],
 ) -> Updates:
-    """The updates of controllers that go together, whose numbers among all are these, before their first step; with what has
-    `moved` where that is known."""
+    """The updates of controllers that go together, whose numbers among all are these, before their first step; with what is valid
+    for them, and what has `moved` where that is known."""
     chooser, n, rows = own[0].chooser, len(own), rows_of(own)
     if moved is None:
         moved = chooser.move(rows, dt_s)[0]
-    valid: Any = asked.valid
-    if valid is not None and n < len(asked.tags):
-        valid = [own_valid(valid, i) for i in numbers]
     if not (is_plain := asked.is_plain) or not hasattr(valid, "table_assets"):
         chooser.check_names(NOTHING_MORE if is_plain else asked.options(numbers[0]), valid)
     flags, biases, plays = chooser.ranges(valid, n)

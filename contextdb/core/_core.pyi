@@ -1,4 +1,4 @@
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -230,7 +230,7 @@ class Ways:
         self,
         controllers: Controllers,
         before: NDArray[np.float64],
-        goals: NDArray[np.float64],
+        goals: NDArray[np.float64] | tuple[float, float, float],
         bodies: NDArray[np.float64] | None,
         dt_s: float,
         rows: NDArray[np.float64],
@@ -239,12 +239,11 @@ class Ways:
         moved: NDArray[np.float64],
         queries: NDArray[np.float64],
         places: NDArray[np.float64],
-        facts: NDArray[np.float64],
         /,
-    ) -> None:
-        """Write walks as they are some time later, what plays, the queries that ask for the paths that are wished for, where bodies
-        are, and their speed, the direction of their sticks and their turn. A body that is NaN follows its goal, a pose that is NaN
-        is that of what plays."""
+    ) -> tuple[tuple[float, float, float], ...]:
+        """Write walks as they are some time later, what plays, the queries that ask for the paths that are wished for, and where
+        bodies are. Gives of each its speed, the direction of its stick and its turn. The goal of one may be a tuple; a body that is
+        NaN follows its goal, a pose that is NaN is that of what plays."""
     def n_frames(self, walks: NDArray[np.float64], goals: NDArray[np.float64], /) -> int:
         """How many frames the longest of their paths has."""
     def n_behind(self, rate: float, /) -> int:
@@ -294,18 +293,19 @@ class Poses:
         plays: NDArray[np.float64],
         places: NDArray[np.float64] | None,
         dt_s: float,
-        ask: Callable[[tuple[tuple[int, float, float], ...]], Sequence[tuple[float, float, float]]] | None,
+        grounds: object,
         after: NDArray[np.float64],
         displayed: NDArray[np.float64],
         roots: NDArray[np.float64],
         made: NDArray[np.float64],
         contacts: NDArray[np.bool_],
         moves_body: NDArray[np.bool_],
+        ask: Callable[..., Any],
         /,
     ) -> bool:
-        """Put characters through all stages by what was decided; gives whether all play something. `ask` gives the ground at
-        points, each with the number of its character. `made` is what happened to each, the moments at seams, two for each,
-        rotations, translations and positions, one array after the other."""
+        """Put characters through all stages by what was decided; gives whether all play something. `ask` gives what is below: of
+        one of a tuple of grounds, x and z; or of a ground for all and a tuple of (x, z), for each of them. `made` is what happened
+        to each, the moments at seams, two for each, rotations, translations and positions, one array after the other."""
 
 def risen(answer: object, steepest: float, /) -> tuple[float, float, float] | None:
     """A ground's answer (height, (nx, ny, nz)) as its height and by how much it rises along x and z; None for one that is about as

@@ -369,43 +369,57 @@ static void cdbp_run_update(const cdbo_poses *poses, const cdbp_pose_update *to,
     if (state) PyEval_RestoreThread(state);
 }
 
-/* Ask for the ground at the points of those who stand on one: a function of a tuple of (character, x, z) that gives as many (height, rise
- * along x, rise along z). 0 with an error. */
-static int cdbp_ask_ground(const cdbp_pose_update *to, PyObject *ask)
+/* Take the ground below one point, (height, rise along x, rise along z), and give it back. 0 with an error. */
+static int cdbp_take_below(PyObject *answer, double *below)
+{
+    int is_right = answer && PyType_IsSubtype(Py_TYPE(answer), &PyTuple_Type) && PyArg_ParseTuple(answer, "ddd", below, below + 1, below + 2);
+    if (answer) Py_DecRef(answer);
+    if (!is_right && !PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "there is not one height and rise for each point");
+    return is_right;
+}
+
+/* Ask for the ground at the points of those who stand on one. `grounds` is a tuple of that of each, and `ask` gives what is below of a
+ * ground, x and z; or it is one for all, and `ask` gives as many of it and a list of (x, z). 0 with an error. */
+static int cdbp_ask_ground(const cdbp_pose_update *to, PyObject *grounds, PyObject *ask)
 {
     size_t n_all = to->n * to->n_points, n = 0, k;
-    PyObject *points, *heights = NULL, *triples = NULL;
-    int is_right = 1;
+    int is_for_each = PyType_IsSubtype(Py_TYPE(grounds), &PyTuple_Type), is_right = 1;
+    PyObject *points, *answers = NULL, *each = NULL;
     memset(to->below, 0, 3 * n_all * sizeof(double));
     for (k = 0; k < n_all; k++) {
         if (to->given[k / to->n_points].gives_ground == 0.0) to->points[2 * k] = NAN;
         n += to->points[2 * k] == to->points[2 * k];
     }
-    points = PyTuple_New((Py_ssize_t)n);
-    for (k = n = 0; points && is_right && k < n_all; k++) {
-        const double *point = to->points + 2 * k;
-        PyObject *own = point[0] == point[0] ? Py_BuildValue("(ndd)", (Py_ssize_t)(k / to->n_points), point[0], point[1]) : NULL;
-        if (own) PyTuple_SetItem(points, (Py_ssize_t)n++, own);
-        else is_right = !PyErr_Occurred();
-    }
-    if (points && is_right) heights = PyObject_CallFunctionObjArgs(ask, points, NULL);
-    if (points) Py_DecRef(points);
-    triples = heights ? PySequence_Tuple(heights) : NULL;
-    if (heights) Py_DecRef(heights);
-    is_right = triples && PyTuple_Size(triples) == (Py_ssize_t)n;
+    points = is_for_each ? NULL : PyTuple_New((Py_ssize_t)n);
     for (k = n = 0; is_right && k < n_all; k++) {
-        double *below = to->below + 3 * k;
-        PyObject *own = to->points[2 * k] == to->points[2 * k] ? PyTuple_GetItem(triples, (Py_ssize_t)n++) : NULL;
-        if (own) is_right = PyType_IsSubtype(Py_TYPE(own), &PyTuple_Type) && PyArg_ParseTuple(own, "ddd", below, below + 1, below + 2);
+        const double *point = to->points + 2 * k;
+        PyObject *own = NULL;
+        if (point[0] != point[0]) continue;
+        if (is_for_each) {
+            PyObject *ground = PyTuple_GetItem(grounds, (Py_ssize_t)(k / to->n_points));
+            PyObject *x = ground ? PyFloat_FromDouble(point[0]) : NULL, *z = x ? PyFloat_FromDouble(point[1]) : NULL;
+            own = z ? PyObject_CallFunctionObjArgs(ask, ground, x, z, NULL) : NULL;
+            if (x) Py_DecRef(x);
+            if (z) Py_DecRef(z);
+            is_right = own && cdbp_take_below(own, to->below + 3 * k);
+        } else if (points && (own = Py_BuildValue("(dd)", point[0], point[1]))) PyTuple_SetItem(points, (Py_ssize_t)n++, own);
+        else is_right = 0;
     }
-    if (triples) Py_DecRef(triples);
-    if (!is_right && !PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "there is not one height and rise for each point");
+    if (is_for_each) return is_right;
+    if (points && is_right) answers = PyObject_CallFunctionObjArgs(ask, grounds, points, NULL);
+    if (points) Py_DecRef(points);
+    each = answers ? PyObject_GetIter(answers) : NULL;
+    if (answers) Py_DecRef(answers);
+    for (k = 0; each && is_right && k < n_all; k++)
+        if (to->points[2 * k] == to->points[2 * k]) is_right = cdbp_take_below(PyIter_Next(each), to->below + 3 * k);
+    is_right = is_right && each;
+    if (each) Py_DecRef(each);
     return is_right;
 }
 
-/* poses.update(before, plays, places or None, seconds, ask or None, after, displayed, roots, made, contacts, moves_body): put characters
- * through all stages, by what was decided, and ask for the ground on the way; whether all play something. `made` is what happened to them,
- * the moments at seams, two for each, and their rotations, translations and positions. */
+/* poses.update(before, plays, places or None, seconds, grounds or None, after, displayed, roots, made, contacts, moves_body, ask): put
+ * characters through all stages, by what was decided, and ask for the ground on the way; whether all play something. `made` is what
+ * happened to them, the moments at seams, two for each, and their rotations, translations and positions. */
 static PyObject *cdbp_poses_update(PyObject *self, PyObject *const *in, Py_ssize_t n)
 {
     const cdbo_poses *poses = cdbp_made_poses(self);
@@ -414,7 +428,7 @@ static PyObject *cdbp_poses_update(PyObject *self, PyObject *const *in, Py_ssize
     double *room = NULL;
     int is_whole = 0, is_done = 0;
     a.n = 0;
-    if (poses && n == 11 && cdbp_take_update(poses, &a, in, &to) == 0) {
+    if (poses && n == 12 && cdbp_take_update(poses, &a, in, &to) == 0) {
         size_t n_room = cdbo_pose_room(poses), n_all = in[4] == Py_None ? 0 : to.n * to.n_points;
         room = (double *)PyMem_Malloc((n_room + 5 * n_all + 1) * sizeof(double));
         if (!room) PyErr_NoMemory();
@@ -422,12 +436,12 @@ static PyObject *cdbp_poses_update(PyObject *self, PyObject *const *in, Py_ssize
             is_whole = cdbp_receive_all(poses, &to);
             to.points = room + n_room, to.below = to.points + 2 * n_all;
             cdbp_run_update(poses, &to, in[4] == Py_None ? CDBO_WHOLE : CDBO_UP_TO_GROUND, room);
-            is_done = in[4] == Py_None || cdbp_ask_ground(&to, in[4]);
+            is_done = in[4] == Py_None || cdbp_ask_ground(&to, in[4], in[11]);
             if (is_done && in[4] != Py_None) cdbp_run_update(poses, &to, CDBO_FROM_GROUND, room);
         }
         PyMem_Free(room);
     }
-    if (!is_done) return cdbp_given_back(&a, 0, "update takes 11 arguments");
+    if (!is_done) return cdbp_given_back(&a, 0, "update takes 12 arguments");
     cdbp_release(&a);
     return cdbp_new_ref(is_whole ? Py_True : Py_False);
 }

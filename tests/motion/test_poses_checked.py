@@ -8,6 +8,7 @@ from strategies import for_each
 from contextdb import core
 from contextdb.motion import PoseSettings
 from contextdb.motion.output import pipeline as pipelines
+from contextdb.motion.output.ground import below
 from contextdb.motion.output.pose import N_MADE
 
 RIG = bank().skeleton
@@ -88,6 +89,10 @@ def test_a_rig_that_does_not_go_with_its_banks_is_refused(name, change):
         poses(**{name: change})
 
 
+def slope(x, z):
+    return 0.1 * z, (0.0, 0.995, -0.0995)
+
+
 def updated(own, at=0, number=0.0, **changed):
     """An update of two characters, with one number of what plays another one."""
     n, joints, feet = 2, RIG.n_joints, len(bank().feet)
@@ -98,9 +103,9 @@ def updated(own, at=0, number=0.0, **changed):
     plays[1, at] = number
     made = np.empty(n * (N_MADE + 10 * joints))
     arrays = {
-        **{"before": before, "plays": plays, "places": None, "dt": 0.1, "ask": None, "after": np.empty_like(before)},
+        **{"before": before, "plays": plays, "places": None, "dt": 0.1, "grounds": None, "after": np.empty_like(before)},
         **{"displayed": np.empty((n, 3)), "roots": np.empty((n, 3)), "made": made},
-        **{"contacts": np.empty((n, feet), np.bool_), "moves_body": np.empty(n, np.bool_)},
+        **{"contacts": np.empty((n, feet), np.bool_), "moves_body": np.empty(n, np.bool_), "ask": below},
     }
     own.update(*(arrays | changed).values())
     return made[n * N_MADE :]
@@ -136,10 +141,11 @@ def test_arrays_of_another_shape_are_refused(changed):
         updated(poses(), **changed)
 
 
-@pytest.mark.parametrize("ask", [1, lambda points: points[:1], lambda points: [None] * len(points), lambda points: 1 / 0])
-def test_a_ground_that_gives_no_heights_is_refused(ask):
-    with pytest.raises((ValueError, TypeError, ZeroDivisionError)):
-        updated(poses(), 15, 1.0, ask=ask)
+@pytest.mark.parametrize("ask", [1, lambda _, points: [], lambda _, points: [None] * len(points), lambda *_: 1 / 0])
+@pytest.mark.parametrize("grounds", [slope, (slope, slope), (slope,)])
+def test_a_ground_that_gives_no_heights_is_refused(ask, grounds):
+    with pytest.raises((ValueError, TypeError, IndexError, ZeroDivisionError)):
+        updated(poses(), 15, 1.0, grounds=grounds, ask=ask)
 
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -1e300])

@@ -370,19 +370,23 @@ class Character:
     ) -> Step:
         dt = require_real(dt, "dt", 0.0)
         stick = require_point(stick, "stick", "two numbers, x and z in metres a second")
-        given = {} if facts is None else require_mapping(facts, "facts", "a mapping of names to facts")
-        require_kind(body, (Steered, type(None)), "body", "a Steered")
-        require_kind(path, (Trajectory, type(None)), "path", "a Trajectory over the ground")
+        given = {} if facts is None else facts
+        if type(given) is not dict:
+            require_mapping(given, "facts", "a mapping of names to facts")
+        if body is not None:
+            require_kind(body, Steered, "body", "a Steered")
+        if path is not None:
+            require_kind(path, Trajectory, "path", "a Trajectory over the ground")
         if facing is not None:
             require_real(facing, "facing")
         goal = *stick, walks.UNKNOWN if facing is None else facing
-        goals, pose = np.array([goal], np.float64), None if self.pose is None else self._given_pose(dt)[None]
-        on = walks.onward(self.schema, self.controller.chooser, self._row, goals, dt, self.controller.row, pose, body)
-        paths: Paths = WishedPaths(self.schema, on.walks, goals)
+        pose = None if self.pose is None else self._given_pose(dt)[None]
+        on = walks.onward(self.schema, *self.controller.stand, self._row, goal, dt, pose, body)
+        paths: Paths = WishedPaths(self.schema, on.walks, goal)
         if path is not None:
             paths, queries = walks.wished_along(self.schema, on.walks, path, on.queries)
             on = on._replace(queries=queries)
-        return Step(dt, on, self._with_own(given, dt, goal, on.facts[0].tolist(), on.walks, 0), paths)
+        return Step(dt, on, self._with_own(given, dt, goal, on.facts[0], on.walks, 0), paths)
 
     def _with_own(
         self, given: Facts, dt: float, goal: tuple[float, float, float], numbers: Sequence[float], rows: Floats, i: int

@@ -127,7 +127,7 @@ class Crowd(ListSequence[Character]):
             raise MotionError(Fault("the characters have different features.", "characters of one feature schema"))
         goals, given = _goals(sticks, facing, len(self)), _facts_of_each(facts, len(self))
         on = self._onward(dt, goals)
-        each = zip(self, given, goals.tolist(), on.facts.tolist(), strict=True)
+        each = zip(self, given, goals.tolist(), on.facts, strict=True)
         facts_of = [one._with_own(own, dt, goal, numbers, on.walks, i) for i, (one, own, goal, numbers) in enumerate(each)]
         group = ControllerGroup(character.controller for character in self)
         valid = self._valid(facts_of)
@@ -155,13 +155,15 @@ class Crowd(ListSequence[Character]):
         parts = []
         for numbers in _alike({i: character.controller.chooser for i, character in enumerate(self)}, id, is_):
             own, chooser = [self[i].controller for i in numbers], self[numbers[0]].controller.chooser
-            given = None if poses is None else poses[numbers]
-            part = walks.onward(schema, chooser, rows[numbers], goals[numbers], dt, rows_of(own), given)
             if len(numbers) == len(self):
-                return part
-            parts.append((numbers, part))
+                return walks.onward(schema, chooser, rows_of(own), rows, goals, dt, poses)
+            given = None if poses is None else poses[numbers]
+            parts.append((numbers, walks.onward(schema, chooser, rows_of(own), rows[numbers], goals[numbers], dt, given)))
         order = np.argsort([i for numbers, _ in parts for i in numbers])
-        return Onward(*(np.concatenate(arrays)[order] for arrays in zip(*(part for _, part in parts), strict=True)))
+        *arrays, facts = zip(*(part for _, part in parts), strict=True)
+        together = [own for each in facts for own in each]
+        after, moved, queries, places = (np.concatenate(each)[order] for each in arrays)
+        return Onward(after, moved, queries, places, [together[i] for i in order])
 
     def _rows(self) -> Floats:
         """The walks of all: as the last update left them, unless one was elsewhere meanwhile."""

@@ -74,12 +74,4 @@ def below_many(ground: ManyGround, points: Sequence[tuple[float, float]]) -> lis
 
 
 Grounds = tuple[Ground | None, ...] | ManyGround
-Points = Sequence[tuple[int, float, float]]
-"""The number of a character, x and z."""
-
-
-def below_all(grounds: Grounds, points: Points) -> list[Triple]:
-    """Height and rise of the ground at points of characters."""
-    if isinstance(grounds, tuple):
-        return [below(grounds[i], x, z) for i, x, z in points]
-    return below_many(grounds, [(x, z) for _, x, z in points]) if points else []
+"""One for each of some characters, or one for all."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.output.bank import RIG_MEND, PoseBank
 from contextdb.motion.output.clip_parts import tops_of
-from contextdb.motion.output.ground import Grounds, below_all
+from contextdb.motion.output.ground import Grounds, below, below_many
 from contextdb.motion.output.legs import hinges_of, legs_of
 from contextdb.motion.output.pose import N_MADE, CrowdPoses
 from contextdb.motion.output.samples import Flags
@@ -122,11 +122,11 @@ class Pipeline:
         """The rows and the poses of all after a decision for each, and what `plays` by it; `places` [N, 3] are those of the bodies,
         NaN for none. And whether the clip alone moves the body of each, as the row of what plays or the settings say: bool [N]."""
         n, (n_joints, n_feet) = len(rows.last), self._sizes
-        core, ask = (self._flat, None) if grounds is None else (self._grounded, partial(below_all, grounds))
+        core, ask = self._flat if grounds is None else self._grounded, below if isinstance(grounds, tuple) else below_many
         after, displayed, roots = np.empty((n, self.width)), np.empty((n, 3)), np.empty((n, 3))
         made, contacts, moves_body = np.empty(n * (N_MADE + 10 * n_joints)), np.empty((n, n_feet), np.bool_), np.empty(n, np.bool_)
         last: list[Displayed] = list(decisions)
-        if not core.update(rows.numbers, plays, places, dt, ask, after, displayed, roots, made, contacts, moves_body):
+        if not core.update(rows.numbers, plays, places, dt, grounds, after, displayed, roots, made, contacts, moves_body, ask):
             each = zip(plays[:, 0].tolist(), decisions, rows.last, strict=True)
             last = [was if bank < 0.0 else decision for bank, decision, was in each]
         poses = CrowdPoses(decisions, roots, contacts, after, made, n_joints)

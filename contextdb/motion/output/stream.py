@@ -203,7 +203,8 @@ class PoseStream:
     def posed(self, decided: Decided, dt: float, places: Floats, ground: Ground | None) -> tuple[CrowdPoses, Flags]:
         """The same unchecked, of one, with the place of its body [1, 3], whose `Pose` is made when it is requested; and whether the
         clip alone moves the body [1]."""
-        rows, ((_, updates),), grounds = self._rows.row(self._at), decided.updates, None if ground is None else (ground,)
+        rows, ((_, updates),) = self._rows if len(self._rows.last) == 1 else self._rows.row(self._at), decided.updates
+        grounds = None if ground is None else (ground,)
         rows, poses, moves_body = self._pipeline.decided(rows, updates, decided.decisions, dt, places, grounds)
         self._go_on(rows, 0)
         return poses, moves_body

@@ -208,10 +208,14 @@ class Controller:
         return self._rows if len(self._rows) == 1 else self._rows[self._at : self._at + 1]
 
     @property
+    def stand(self) -> tuple[Chooser, Floats]:
+        """What the core knows of the selector and the settings, and where the controller is there: [1, W], not to be changed."""
+        return self.chooser, self._row
+
+    @property
     def row(self) -> Floats:
-        """Where the controller is, as the core has it: [1, W], not to be changed."""
-        self.chooser  # noqa: B018  (the selector may have been exchanged)
-        return self._row
+        """Where the controller is."""
+        return self.stand[1]
 
     @property
     def _state(self) -> ControllerState:
@@ -429,10 +433,12 @@ def prepared(
     chooser, n, rows = own[0].chooser, len(own), rows_of(own)
     if moved is None:
         moved = chooser.move(rows, dt_s)[0]
-    if not (is_plain := asked.is_plain) or not hasattr(valid, "table_assets"):
+    is_plain, is_answered = asked.is_plain, hasattr(valid, "table_assets")
+    if not (is_plain and is_answered):
         chooser.check_names(NOTHING_MORE if is_plain else asked.options(numbers[0]), valid)
     flags, biases, plays = chooser.ranges(valid, n)
-    wide = _wide(chooser, moved, flags, valid, asked, numbers) if widens(valid) else None
+    is_widening = valid.is_widening if is_answered else widens(valid)
+    wide = _wide(chooser, moved, flags, valid, asked, numbers) if is_widening else None
     if queries.shape[1] != chooser.n_features or not queries.flags.c_contiguous:
         queries = np.ascontiguousarray(queries[:, : chooser.n_features])
     given = Given(queries, dt_s, flags, biases, *chooser.nothing_more, np.zeros(n, np.uint8), wide, plays)

@@ -83,6 +83,10 @@ def as_number(value: object) -> float | None:
 
 def require_point(value: object, what: str, accepted: str) -> tuple[float, float]:
     """A pair of finite numbers, which may be an array."""
+    if type(value) is tuple and len(value) == 2:
+        one, other = value
+        if type(one) is type(other) is float and -MOST <= one <= MOST and -MOST <= other <= MOST:  # as mostly
+            return one, other
     is_row = isinstance(value, (tuple, list)) or (isinstance(value, np.ndarray) and value.ndim == 1)
     if not is_row or len(value) != 2:  # type: ignore[arg-type]
         raise _wrong(value, what, accepted)

@@ -454,9 +454,13 @@ class CompiledData(Unchanging):
         return ask(context)
 
     def _binding(self, ask: StraightAsk) -> StraightAsk:
+        is_only_mirrored, keep = bool(self.mirroring) and not self.widening and not self.is_soft, self.keep
+
         def bound(context: Context) -> Matches | None:
             answer = ask(context)
-            return None if answer is None else self.bound(answer, context)
+            if answer is None:
+                return None
+            return with_mirrored(answer, keep(context)) if is_only_mirrored else self.bound(answer, context)
 
         return bound
 

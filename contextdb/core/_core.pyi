@@ -294,7 +294,7 @@ class Ways:
         self,
         controllers: Controllers,
         before: NDArray[np.float64],
-        goals: NDArray[np.float64],
+        goals: NDArray[np.float64] | tuple[float, float, float],
         bodies: NDArray[np.float64] | None,
         dt_s: float,
         rows: NDArray[np.float64],
@@ -303,12 +303,11 @@ class Ways:
         moved: NDArray[np.float64],
         queries: NDArray[np.float64],
         places: NDArray[np.float64],
-        facts: NDArray[np.float64],
         /,
-    ) -> None:
-        """Write walks as they are some time later, what plays, the queries that ask for the paths that are wished for, where bodies
-        are, and their speed, the direction of their sticks and their turn. A body that is NaN follows its goal, a pose that is NaN
-        is that of what plays."""
+    ) -> tuple[tuple[float, float, float], ...]:
+        """Write walks as they are some time later, what plays, the queries that ask for the paths that are wished for, and where
+        bodies are. Gives of each its speed, the direction of its stick and its turn. The goal of one may be a tuple; a body that is
+        NaN follows its goal, a pose that is NaN is that of what plays."""
     def n_frames(self, walks: NDArray[np.float64], goals: NDArray[np.float64], /) -> int:
         """How many frames the longest of their paths has."""
     def n_behind(self, rate: float, /) -> int:
@@ -352,37 +351,29 @@ class Poses:
     def width(self) -> int: ...
     def begin(self, row: NDArray[np.float64], /) -> None:
         """Write the row of a character that has not displayed anything yet."""
-    def receive(
-        self,
-        rows: NDArray[np.float64],
-        plays: NDArray[np.float64],
-        dt_s: float,
-        given: NDArray[np.float64],
-        seams: NDArray[np.float64],
-        displayed: NDArray[np.float64],
-        /,
-    ) -> int:
-        """Write what happens to characters by what was decided, and what is displayed then; gives how many moments at seams there
-        are, two for each."""
     def update(
         self,
         before: NDArray[np.float64],
-        given: NDArray[np.float64],
+        plays: NDArray[np.float64],
         places: NDArray[np.float64] | None,
-        seams: NDArray[np.float64] | None,
         dt_s: float,
+        grounds: object,
         after: NDArray[np.float64],
+        displayed: NDArray[np.float64],
         roots: NDArray[np.float64],
-        rotations: NDArray[np.float64],
-        translations: NDArray[np.float64],
-        positions: NDArray[np.float64],
+        made: NDArray[np.float64],
         contacts: NDArray[np.bool_],
-        points: NDArray[np.float64] | None,
-        below: NDArray[np.float64] | None,
+        moves_body: NDArray[np.bool_],
+        ask: Callable[..., Any],
         /,
-    ) -> None:
-        """Put characters through all stages: with `points`, which are written, through those before the ground, and with what is
-        `below` them through the others."""
+    ) -> bool:
+        """Put characters through all stages by what was decided; gives whether all play something. `ask` gives what is below: of
+        one of a tuple of grounds, x and z; or of a ground for all and a tuple of (x, z), for each of them. `made` is what happened
+        to each, the moments at seams, two for each, rotations, translations and positions, one array after the other."""
+
+def risen(answer: object, steepest: float, /) -> tuple[float, float, float] | None:
+    """A ground's answer (height, (nx, ny, nz)) as its height and by how much it rises along x and z; None for one that is about as
+    steep, that points down, or that is not made of floats in tuples."""
 
 def pose_columns() -> dict[str, int]:
     """Where each single number of a character's row is, by its name."""
@@ -566,12 +557,13 @@ def fill_plays(
     banks: NDArray[np.int64],
     ranges: NDArray[np.int64],
     displayed: NDArray[np.float64],
-    gives: NDArray[np.bool_],
+    grounds: object,
     plays: NDArray[np.float64],
     /,
 ) -> bool:
     """Write what poses are made of, by what was decided; gives whether the banks have all that plays. `banks` is that of each
-    database, `ranges` from `starts[d]` on the range there of each of its ranges, below 0 for none."""
+    database, `ranges` from `starts[d]` on the range there of each of its ranges, below 0 for none; `grounds` is for all, a tuple
+    for each."""
 
 def search_joint(*arguments: NDArray[Any]) -> None:
     """search_joint(blocks, rank, boxes, lows, highs, channels, weights, ranges, firsts, relative, relative_lows, relative_highs,

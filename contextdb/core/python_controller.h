@@ -425,25 +425,25 @@ static int cdbp_instant_of(const cdbm_playing *playing, const int64_t *starts, s
     return to->bank >= 0.0 && to->range >= 0.0;
 }
 
-/* fill_plays(decisions, starts, banks, ranges, displayed, gives, plays): what poses are made of, by what was decided; whether the banks
- * have all that plays. `banks` is that of each database, `ranges` the range there of each of its ranges, below 0 for none. */
+/* fill_plays(decisions, starts, banks, ranges, displayed, grounds, plays): what poses are made of, by what was decided; whether the banks
+ * have all that plays. `banks` is that of each database, `ranges` the range there of each of its ranges, below 0 for none; `grounds` a
+ * ground for all, or a tuple of those of each, None for none. */
 static PyObject *cdbp_fill_plays(PyObject *module, PyObject *const *in, Py_ssize_t n)
 {
     cdbp_arrays a;
     const cdbm_decision *decisions;
     const int64_t *starts, *banks, *ranges = NULL;
     const cdbo_instant *displayed = NULL;
-    const uint8_t *gives = NULL;
     cdbo_play *plays = NULL;
     size_t s[3], n_rows = 0, n_banks = 0, n_ranges = 0, i;
-    int is_right = 0, is_whole = 1;
+    int is_right = 0, is_whole = 1, is_for_each = n == 7 && PyType_IsSubtype(Py_TYPE(in[5]), &PyTuple_Type);
     (void)module;
     a.n = 0;
     if (n == 7 && (decisions = (const cdbm_decision *)cdbp_numbers(&a, in[0], s, 2, CDBP_ANY, sizeof *decisions / sizeof(double), 0))
         && ((n_rows = s[0]), 1) && (banks = cdbp_int64s(&a, in[2], s, 1, CDBP_ANY, 0)) && ((n_banks = s[0]), 1)
         && (starts = cdbp_int64s(&a, in[1], s, 1, n_banks + 1, 0)) && (ranges = cdbp_int64s(&a, in[3], s, 1, CDBP_ANY, 0))
         && ((n_ranges = s[0]), 1) && (displayed = (const cdbo_instant *)cdbp_numbers(&a, in[4], s, 2, n_rows, 3, 0))
-        && (gives = (const uint8_t *)cdbp_shaped(&a, in[5], 'b', 1, 0, s, 1, n_rows, 0, 0))
+        && (!is_for_each || PyTuple_Size(in[5]) == (Py_ssize_t)n_rows)
         && (plays = (cdbo_play *)cdbp_to_numbers(&a, in[6], s, 2, n_rows, sizeof *plays / sizeof(double), 0))) {
         is_right = starts[0] == 0 && (uint64_t)starts[n_banks] == n_ranges;
         for (i = 0; i < n_banks; i++) is_right = is_right && starts[i] <= starts[i + 1];
@@ -451,7 +451,8 @@ static PyObject *cdbp_fill_plays(PyObject *module, PyObject *const *in, Py_ssize
             cdbo_instant playing, before;
             is_whole &= cdbp_instant_of(&decisions[i].playing, starts, n_banks, banks, ranges, &playing);
             is_whole &= cdbp_instant_of(&decisions[i].before, starts, n_banks, banks, ranges, &before);
-            plays[i] = cdbm_pose_play(&decisions[i], playing, before, displayed[i], gives[i]);
+            plays[i] = cdbm_pose_play(&decisions[i], playing, before, displayed[i],
+                (is_for_each ? PyTuple_GetItem(in[5], (Py_ssize_t)i) : in[5]) != Py_None);
         }
     }
     if (!is_right) return cdbp_given_back(&a, 0, "fill_plays takes decisions, banks and ranges of databases, and arrays that go together");

@@ -153,7 +153,29 @@ static PyObject *cdbp_pose_ground(PyObject *module, PyObject *const *in, Py_ssiz
     return cdbp_given_back(&a, is_done, "feel_ground takes four arrays, whether a body is new, and seconds");
 }
 
+/* risen(answer, steepest): a ground's answer (height, (nx, ny, nz)) as its height and by how much it rises along x and z; None for one that
+ * is steeper, that points down, or that is made of anything but floats. */
+static PyObject *cdbp_risen(PyObject *module, PyObject *const *in, Py_ssize_t n)
+{
+    double numbers[4] = {0.0, 0.0, 0.0, 0.0}, steepest = n == 2 ? PyFloat_AsDouble(in[1]) : 0.0, along[2];
+    PyObject *normal = n == 2 && Py_TYPE(in[0]) == &PyTuple_Type && PyTuple_Size(in[0]) == 2 ? PyTuple_GetItem(in[0], 1) : NULL;
+    Py_ssize_t i;
+    (void)module;
+    if (PyErr_Occurred()) return NULL;
+    if (!normal || Py_TYPE(normal) != &PyTuple_Type || PyTuple_Size(normal) != 3) return cdbp_new_ref(Py_None);
+    for (i = 0; i < 4; i++) {
+        PyObject *own = i ? PyTuple_GetItem(normal, i - 1) : PyTuple_GetItem(in[0], 0);
+        if (Py_TYPE(own) != &PyFloat_Type) return cdbp_new_ref(Py_None);
+        numbers[i] = PyFloat_AsDouble(own);
+    }
+    if (!(numbers[2] > 0.0 && fabs(numbers[0]) <= DBL_MAX)) return cdbp_new_ref(Py_None);
+    along[0] = -numbers[1] / numbers[2], along[1] = -numbers[3] / numbers[2];
+    if (!(along[0] * along[0] + along[1] * along[1] <= 0.99 * steepest * steepest)) return cdbp_new_ref(Py_None);
+    return Py_BuildValue("(ddd)", numbers[0], along[0], along[1]);
+}
+
 #define CDBP_POSE_FUNCTIONS \
+    {"risen", CDBP_CALL(cdbp_risen), METH_FASTCALL, "The height of a ground, and how it rises along x and z."}, \
     {"pose_columns", cdbp_pose_columns, METH_NOARGS, "Where each single number of a character's row is, by its name."}, \
     {"place_joints", CDBP_CALL(cdbp_place_joints), METH_FASTCALL, "Place the joints of a pose in the world."}, \
     {"bend_legs", CDBP_CALL(cdbp_bend_legs), METH_FASTCALL, "Bend a leg in each of some poses: its ankle comes to a target."}, \

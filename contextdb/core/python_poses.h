@@ -280,34 +280,74 @@ static PyObject *cdbp_poses_begun(PyObject *self, PyObject *row)
 
 /* What an update reads and writes, of N characters. */
 typedef struct cdbp_pose_update {
-    size_t n, n_seams;
+    size_t n, n_points;
     double dt_s;
-    cdbo_part part;
     const double *before, *places;
-    const cdbo_given *given;
-    const cdbo_seam *seams;
-    double *after, *roots, *rotations, *translations, *positions, *points;
-    const double *below;
-    unsigned char *contacts;
+    const cdbo_play *plays;
+    cdbo_given *given;
+    cdbo_seam *seams;
+    cdbo_instant *displayed;
+    double *after, *roots, *rotations, *translations, *positions, *points, *below;
+    unsigned char *contacts, *moves_body;
 } cdbp_pose_update;
 
-/* Whether all that is given names moments that there are. */
-static int cdbp_are_given(const cdbo_poses *poses, const cdbp_pose_update *to)
+/* Whether a moment is one of the banks, or nothing. */
+static int cdbp_is_moment(const cdbo_poses *poses, const cdbo_instant *moment)
 {
-    size_t i;
-    for (i = 0; i < to->n_seams; i++)
-        if (!cdbo_is_moment(poses, to->seams[i].bank, to->seams[i].range)) return 0;
-    for (i = 0; i < to->n; i++) {
-        const cdbo_given *given = &to->given[i];
-        if (given->bank >= 0.0 && !cdbo_is_moment(poses, given->bank, given->range)) return 0;
-        if (given->seam >= 0.0 && !(given->seam < (double)(to->n_seams / 2))) return 0;
-    }
-    return 1;
+    return moment->bank < 0.0 || cdbo_is_moment(poses, moment->bank, moment->range);
 }
 
-static void cdbp_run_update(const cdbo_poses *poses, const cdbp_pose_update *to, double *room)
+/* Take the arrays of an update, in the order of `cdbp_poses_update`. */
+static int cdbp_take_update(const cdbo_poses *poses, cdbp_arrays *a, PyObject *const *in, cdbp_pose_update *to)
 {
-    size_t i, n_joints = poses->rig.n_joints, n_feet = poses->rig.n_feet, n_points = n_feet > 0 ? n_feet : 1;
+    size_t s[3], n, i, n_joints = poses->rig.n_joints, n_given = sizeof(cdbo_given) / sizeof(double), n_seam = sizeof(cdbo_seam) / sizeof(double);
+    double *made;
+    memset(to, 0, sizeof *to);
+    to->dt_s = PyFloat_AsDouble(in[3]);
+    if (PyErr_Occurred() || !(to->before = cdbp_numbers(a, in[0], s, 2, CDBP_ANY, poses->width, 0))) return -1;
+    n = to->n = s[0], to->n_points = poses->rig.n_feet > 0 ? poses->rig.n_feet : 1;
+    if (!(to->plays = (const cdbo_play *)cdbp_numbers(a, in[1], s, 2, n, sizeof(cdbo_play) / sizeof(double), 0))) return -1;
+    if (in[2] != Py_None && !(to->places = cdbp_numbers(a, in[2], s, 2, n, 3, 0))) return -1;
+    if (!(to->after = cdbp_to_numbers(a, in[5], s, 2, n, poses->width, 0))) return -1;
+    if (!(to->displayed = (cdbo_instant *)cdbp_to_numbers(a, in[6], s, 2, n, 3, 0))) return -1;
+    if (!(to->roots = cdbp_to_numbers(a, in[7], s, 2, n, 3, 0))) return -1;
+    if (!(made = cdbp_to_numbers(a, in[8], s, 1, n * (n_given + 2 * n_seam + 10 * n_joints), 0, 0))) return -1;
+    if (!(to->contacts = (unsigned char *)cdbp_shaped(a, in[9], 'b', 1, 1, s, 2, n, poses->rig.n_feet, 0))) return -1;
+    if (!(to->moves_body = (unsigned char *)cdbp_shaped(a, in[10], 'b', 1, 1, s, 1, n, 0, 0))) return -1;
+    to->given = (cdbo_given *)(void *)made, to->seams = (cdbo_seam *)(void *)(made + n_given * n);
+    to->rotations = made + (n_given + 2 * n_seam) * n, to->translations = to->rotations + 4 * n_joints * n;
+    to->positions = to->translations + 3 * n_joints * n;
+    for (i = 0; i < n; i++)
+        if (!cdbp_is_moment(poses, &to->plays[i].playing) || !cdbp_is_moment(poses, &to->plays[i].before)
+            || !cdbp_is_moment(poses, &to->plays[i].displayed)) {
+            PyErr_SetString(PyExc_ValueError, "an update was given a moment that is in no bank");
+            return -1;
+        }
+    return 0;
+}
+
+/* From what was decided to what happens to the poses; whether all play something. */
+static int cdbp_receive_all(const cdbo_poses *poses, const cdbp_pose_update *to)
+{
+    size_t i, n_seams = 0;
+    int is_whole = 1;
+    for (i = 0; i < to->n; i++) {
+        const cdbo_play *play = &to->plays[i];
+        int is_playing = play->playing.bank >= 0.0;
+        double root = play->root == play->root ? play->root : poses->settings[CDBO_ROOT];
+        cdbo_receive(poses, to->before + i * poses->width, play, to->dt_s, &to->given[i], to->seams, &n_seams);
+        to->displayed[i] = is_playing ? play->playing : play->displayed;
+        to->moves_body[i] = root == CDBO_BY_ANIMATION;
+        is_whole = is_whole && is_playing;
+    }
+    return is_whole;
+}
+
+/* Put all through some stages, beside other threads where they are many. */
+static void cdbp_run_update(const cdbo_poses *poses, const cdbp_pose_update *to, cdbo_part part, double *room)
+{
+    size_t i, n_joints = poses->rig.n_joints, n_feet = poses->rig.n_feet;
+    PyThreadState *state = to->n >= CDBP_MANY ? PyEval_SaveThread() : NULL;
     for (i = 0; i < to->n; i++) {
         const double *place = to->places ? to->places + 3 * i : NULL;
         cdbo_posed one;
@@ -322,109 +362,88 @@ static void cdbp_run_update(const cdbo_poses *poses, const cdbp_pose_update *to,
         one.translations = to->translations + 3 * n_joints * i;
         one.positions = to->positions + 3 * n_joints * i;
         one.contacts = to->contacts + n_feet * i;
-        one.below = to->below ? to->below + 3 * n_points * i : NULL;
-        cdbo_pose_one(&one, to->seams, to->dt_s, room, to->part);
-        if (to->points) cdbo_ask_points(&one, to->points + 2 * n_points * i);
+        one.below = part == CDBO_FROM_GROUND ? to->below + 3 * to->n_points * i : NULL;
+        cdbo_pose_one(&one, to->seams, to->dt_s, room, part);
+        if (part == CDBO_UP_TO_GROUND) cdbo_ask_points(&one, to->points + 2 * to->n_points * i);
     }
+    if (state) PyEval_RestoreThread(state);
 }
 
-/* Take the arrays of an update, in the order of `cdbp_poses_update`. */
-static int cdbp_take_update(const cdbo_poses *poses, cdbp_arrays *a, PyObject *const *in, cdbp_pose_update *to)
+/* Take the ground below one point, (height, rise along x, rise along z), and give it back. 0 with an error. */
+static int cdbp_take_below(PyObject *answer, double *below)
 {
-    size_t s[3], n_joints = poses->rig.n_joints, n_points = poses->rig.n_feet > 0 ? poses->rig.n_feet : 1;
-    memset(to, 0, sizeof *to);
-    if (!(to->before = cdbp_numbers(a, in[0], s, 2, CDBP_ANY, poses->width, 0))) return -1;
-    to->n = s[0];
-    if (!(to->given = (const cdbo_given *)cdbp_numbers(a, in[1], s, 2, to->n, sizeof(cdbo_given) / sizeof(double), 0))) return -1;
-    if (in[2] != Py_None && !(to->places = cdbp_numbers(a, in[2], s, 2, to->n, 3, 0))) return -1;
-    if (in[3] != Py_None) {
-        if (!(to->seams = (const cdbo_seam *)cdbp_numbers(a, in[3], s, 2, CDBP_ANY, 4, 0))) return -1;
-        to->n_seams = s[0];
-    }
-    to->dt_s = PyFloat_AsDouble(in[4]);
-    if (PyErr_Occurred()) return -1;
-    if (!(to->after = cdbp_to_numbers(a, in[5], s, 2, to->n, poses->width, 0))) return -1;
-    if (!(to->roots = cdbp_to_numbers(a, in[6], s, 2, to->n, 3, 0))) return -1;
-    if (!(to->rotations = cdbp_to_numbers(a, in[7], s, 3, to->n, n_joints, 4))) return -1;
-    if (!(to->translations = cdbp_to_numbers(a, in[8], s, 3, to->n, n_joints, 3))) return -1;
-    if (!(to->positions = cdbp_to_numbers(a, in[9], s, 3, to->n, n_joints, 3))) return -1;
-    if (!(to->contacts = (unsigned char *)cdbp_shaped(a, in[10], 'b', 1, 1, s, 2, to->n, poses->rig.n_feet, 0))) return -1;
-    if (in[11] != Py_None) {
-        to->part = CDBO_UP_TO_GROUND;
-        if (!(to->points = cdbp_to_numbers(a, in[11], s, 3, to->n, n_points, 2))) return -1;
-    }
-    if (in[12] != Py_None) {
-        to->part = CDBO_FROM_GROUND;
-        if (!(to->below = cdbp_numbers(a, in[12], s, 3, to->n, n_points, 3))) return -1;
-    }
-    if (cdbp_are_given(poses, to) && !(to->points && to->below)) return 0;
-    PyErr_SetString(PyExc_ValueError,
-        "an update was given a moment that is in no bank, a seam that is not there, or points and a ground");
-    return -1;
+    int is_right = answer && PyType_IsSubtype(Py_TYPE(answer), &PyTuple_Type) && PyArg_ParseTuple(answer, "ddd", below, below + 1, below + 2);
+    if (answer) Py_DecRef(answer);
+    if (!is_right && !PyErr_Occurred()) PyErr_SetString(PyExc_ValueError, "there is not one height and rise for each point");
+    return is_right;
 }
 
-/* poses.update(before, given, places or None, seams or None, seconds, after, roots, rotations, translations, positions,
- * contacts, points or None, below or None): all stages; with points those before the ground, which is then asked for; with what
- * is below those from there. */
+/* Ask for the ground at the points of those who stand on one. `grounds` is a tuple of that of each, and `ask` gives what is below of a
+ * ground, x and z; or it is one for all, and `ask` gives as many of it and a list of (x, z). 0 with an error. */
+static int cdbp_ask_ground(const cdbp_pose_update *to, PyObject *grounds, PyObject *ask)
+{
+    size_t n_all = to->n * to->n_points, n = 0, k;
+    int is_for_each = PyType_IsSubtype(Py_TYPE(grounds), &PyTuple_Type), is_right = 1;
+    PyObject *points, *answers = NULL, *each = NULL;
+    memset(to->below, 0, 3 * n_all * sizeof(double));
+    for (k = 0; k < n_all; k++) {
+        if (to->given[k / to->n_points].gives_ground == 0.0) to->points[2 * k] = NAN;
+        n += to->points[2 * k] == to->points[2 * k];
+    }
+    points = is_for_each ? NULL : PyTuple_New((Py_ssize_t)n);
+    for (k = n = 0; is_right && k < n_all; k++) {
+        const double *point = to->points + 2 * k;
+        PyObject *own = NULL;
+        if (point[0] != point[0]) continue;
+        if (is_for_each) {
+            PyObject *ground = PyTuple_GetItem(grounds, (Py_ssize_t)(k / to->n_points));
+            PyObject *x = ground ? PyFloat_FromDouble(point[0]) : NULL, *z = x ? PyFloat_FromDouble(point[1]) : NULL;
+            own = z ? PyObject_CallFunctionObjArgs(ask, ground, x, z, NULL) : NULL;
+            if (x) Py_DecRef(x);
+            if (z) Py_DecRef(z);
+            is_right = own && cdbp_take_below(own, to->below + 3 * k);
+        } else if (points && (own = Py_BuildValue("(dd)", point[0], point[1]))) PyTuple_SetItem(points, (Py_ssize_t)n++, own);
+        else is_right = 0;
+    }
+    if (is_for_each) return is_right;
+    if (points && is_right) answers = PyObject_CallFunctionObjArgs(ask, grounds, points, NULL);
+    if (points) Py_DecRef(points);
+    each = answers ? PyObject_GetIter(answers) : NULL;
+    if (answers) Py_DecRef(answers);
+    for (k = 0; each && is_right && k < n_all; k++)
+        if (to->points[2 * k] == to->points[2 * k]) is_right = cdbp_take_below(PyIter_Next(each), to->below + 3 * k);
+    is_right = is_right && each;
+    if (each) Py_DecRef(each);
+    return is_right;
+}
+
+/* poses.update(before, plays, places or None, seconds, grounds or None, after, displayed, roots, made, contacts, moves_body, ask): put
+ * characters through all stages, by what was decided, and ask for the ground on the way; whether all play something. `made` is what
+ * happened to them, the moments at seams, two for each, and their rotations, translations and positions. */
 static PyObject *cdbp_poses_update(PyObject *self, PyObject *const *in, Py_ssize_t n)
 {
     const cdbo_poses *poses = cdbp_made_poses(self);
     cdbp_arrays a;
     cdbp_pose_update to;
-    double *room;
-    int is_done = 0;
+    double *room = NULL;
+    int is_whole = 0, is_done = 0;
     a.n = 0;
-    if (poses && n == 13 && cdbp_take_update(poses, &a, in, &to) == 0) {
-        room = (double *)PyMem_Malloc(cdbo_pose_room(poses) * sizeof(double));
+    if (poses && n == 12 && cdbp_take_update(poses, &a, in, &to) == 0) {
+        size_t n_room = cdbo_pose_room(poses), n_all = in[4] == Py_None ? 0 : to.n * to.n_points;
+        room = (double *)PyMem_Malloc((n_room + 5 * n_all + 1) * sizeof(double));
         if (!room) PyErr_NoMemory();
         else {
-            PyThreadState *state = to.n >= CDBP_MANY ? PyEval_SaveThread() : NULL;
-            cdbp_run_update(poses, &to, room);
-            if (state) PyEval_RestoreThread(state);
-            PyMem_Free(room);
-            is_done = 1;
+            is_whole = cdbp_receive_all(poses, &to);
+            to.points = room + n_room, to.below = to.points + 2 * n_all;
+            cdbp_run_update(poses, &to, in[4] == Py_None ? CDBO_WHOLE : CDBO_UP_TO_GROUND, room);
+            is_done = in[4] == Py_None || cdbp_ask_ground(&to, in[4], in[11]);
+            if (is_done && in[4] != Py_None) cdbp_run_update(poses, &to, CDBO_FROM_GROUND, room);
         }
+        PyMem_Free(room);
     }
-    return cdbp_given_back(&a, is_done, "update takes 13 arguments");
-}
-
-/* Whether a moment is one of the banks, or nothing. */
-static int cdbp_is_moment(const cdbo_poses *poses, const cdbo_instant *moment)
-{
-    return moment->bank < 0.0 || cdbo_is_moment(poses, moment->bank, moment->range);
-}
-
-/* poses.receive(rows, plays, seconds, given, seams, displayed): what happens to each in an update, what is displayed then, and how many
- * moments at seams, of 2 N at most. */
-static PyObject *cdbp_poses_receive(PyObject *self, PyObject *const *in, Py_ssize_t n)
-{
-    const cdbo_poses *poses = cdbp_made_poses(self);
-    cdbp_arrays a;
-    const double *rows;
-    const cdbo_play *plays;
-    cdbo_given *given;
-    cdbo_seam *seams;
-    cdbo_instant *displayed;
-    double dt_s = poses && n == 6 ? PyFloat_AsDouble(in[2]) : 0.0;
-    size_t s[3], n_rows = 0, n_seams = 0, i;
-    int is_done = 0;
-    a.n = 0;
-    if (poses && n == 6 && !PyErr_Occurred() && (rows = cdbp_numbers(&a, in[0], s, 2, CDBP_ANY, poses->width, 0)) && ((n_rows = s[0]), 1)
-        && (plays = (const cdbo_play *)cdbp_numbers(&a, in[1], s, 2, n_rows, sizeof(cdbo_play) / sizeof(double), 0))
-        && (given = (cdbo_given *)cdbp_to_numbers(&a, in[3], s, 2, n_rows, sizeof(cdbo_given) / sizeof(double), 0))
-        && (seams = (cdbo_seam *)cdbp_to_numbers(&a, in[4], s, 2, 2 * n_rows, 4, 0))
-        && (displayed = (cdbo_instant *)cdbp_to_numbers(&a, in[5], s, 2, n_rows, 3, 0))) {
-        for (i = 0, is_done = 1; i < n_rows; i++)
-            is_done = is_done && cdbp_is_moment(poses, &plays[i].playing) && cdbp_is_moment(poses, &plays[i].before)
-                && cdbp_is_moment(poses, &plays[i].displayed);
-        for (i = 0; is_done && i < n_rows; i++) {
-            cdbo_receive(poses, rows + i * poses->width, &plays[i], dt_s, &given[i], seams, &n_seams);
-            displayed[i] = plays[i].playing.bank >= 0.0 ? plays[i].playing : plays[i].displayed;
-        }
-    }
-    if (!is_done) return cdbp_given_back(&a, 0, "receive takes rows, moments that are there, seconds and three arrays");
+    if (!is_done) return cdbp_given_back(&a, 0, "update takes 12 arguments");
     cdbp_release(&a);
-    return PyLong_FromLongLong((long long)n_seams);
+    return cdbp_new_ref(is_whole ? Py_True : Py_False);
 }
 
 static PyObject *cdbp_poses_width(PyObject *self, void *unused)
@@ -435,7 +454,6 @@ static PyObject *cdbp_poses_width(PyObject *self, void *unused)
 
 static PyMethodDef cdbp_poses_methods[] = {
     {"begin", cdbp_poses_begun, METH_O, "Write the row of a character that has not displayed anything yet."},
-    {"receive", CDBP_CALL(cdbp_poses_receive), METH_FASTCALL, "Write what happens to characters by what was decided."},
     {"update", CDBP_CALL(cdbp_poses_update), METH_FASTCALL, "Put characters through the stages."},
     {NULL, NULL, 0, NULL},
 };

@@ -117,10 +117,19 @@ typedef struct cdbp_onward {
     double dt_s;
     const double *before, *rows, *poses;
     const cdbo_goal *goals;
+    double goal[3];        /* that of one */
     const cdbo_body *bodies;
-    double *after, *queries, *places, *facts;
+    double *after, *queries, *places;
     cdbm_moved *moved;
 } cdbp_onward;
+
+/* The goals of an array, or that of one in a tuple. */
+static const cdbo_goal *cdbp_take_goals(cdbp_arrays *a, PyObject *given, size_t n, double *one)
+{
+    size_t s[3];
+    if (!PyType_IsSubtype(Py_TYPE(given), &PyTuple_Type)) return (const cdbo_goal *)cdbp_numbers(a, given, s, 2, n, 3, 0);
+    return n == 1 && PyArg_ParseTuple(given, "ddd", one, one + 1, one + 2) ? (const cdbo_goal *)(void *)one : NULL;
+}
 
 static int cdbp_take_onward(const cdbm_ways *ways, const cdbm_controller *controller, cdbp_arrays *a, PyObject *const *in, cdbp_onward *to)
 {
@@ -129,14 +138,14 @@ static int cdbp_take_onward(const cdbm_ways *ways, const cdbm_controller *contro
     to->dt_s = PyFloat_AsDouble(in[3]);
     if (PyErr_Occurred() || !(to->before = cdbp_walks(ways, a, in[0], 0, &n))) return 0;
     to->n = n;
-    return (to->goals = (const cdbo_goal *)cdbp_numbers(a, in[1], s, 2, n, 3, 0)) != NULL
+    return (to->goals = cdbp_take_goals(a, in[1], n, to->goal)) != NULL
         && (in[2] == Py_None || (to->bodies = (const cdbo_body *)cdbp_numbers(a, in[2], s, 2, n, 10, 0)))
         && (to->rows = cdbp_numbers(a, in[4], s, 2, n, cdbm_width(controller), 0)) && cdbp_are_rows(controller, to->rows, n)
         && (in[5] == Py_None || (to->poses = cdbp_numbers(a, in[5], s, 2, n, ways->n_features, 0)))
         && (to->after = cdbp_walks(ways, a, in[6], 1, &n))
         && (to->moved = (cdbm_moved *)cdbp_to_numbers(a, in[7], s, 2, n, sizeof *to->moved / sizeof(double), 0))
         && (to->queries = cdbp_to_numbers(a, in[8], s, 2, n, ways->n_features, 0))
-        && (to->places = cdbp_to_numbers(a, in[9], s, 2, n, 3, 0)) && (to->facts = cdbp_to_numbers(a, in[10], s, 2, n, 3, 0));
+        && (to->places = cdbp_to_numbers(a, in[9], s, 2, n, 3, 0));
 }
 
 /* One of them: `room` has numbers for its path and three times its features. */
@@ -157,13 +166,27 @@ static void cdbp_go_onward(const cdbm_ways *ways, const cdbm_controller *control
     cdbm_wish(ways, walk, goal, ways->rate, n_frames, positions, headings);
     cdbm_ask_path(ways, pose, ways->rate, n_frames, positions, headings, lengths, narrow, to->queries + i * n_features);
     to->places[3 * i] = now->body.position[0], to->places[3 * i + 1] = now->body.position[1], to->places[3 * i + 2] = now->body.heading;
-    to->facts[3 * i] = cdbm_own_fact(now, goal, 's'), to->facts[3 * i + 1] = cdbm_own_fact(now, goal, 'd');
-    to->facts[3 * i + 2] = cdbm_own_fact(now, goal, 't');
 }
 
-/* ways.go_on(controllers, walks, goals, bodies or None, seconds, rows, poses or None, after, moved, queries, places, facts): characters
- * some time later, what they play, and the queries that ask for the paths that they wish to take; where their bodies are, and their
- * speed, the direction of their sticks, and their turn. A body that is NaN follows its goal, a pose that is NaN is that of what plays. */
+/* What each knows of itself: (speed, direction of its stick, turn). */
+static PyObject *cdbp_own_facts(const cdbm_ways *ways, const cdbp_onward *to)
+{
+    PyObject *facts = PyTuple_New((Py_ssize_t)to->n);
+    size_t i;
+    for (i = 0; facts && i < to->n; i++) {
+        const cdbm_walk *now = (const cdbm_walk *)(const void *)(to->after + i * cdbm_walk_width(ways));
+        const cdbo_goal *goal = &to->goals[i];
+        PyObject *own = Py_BuildValue("(ddd)", cdbm_own_fact(now, goal, 's'), cdbm_own_fact(now, goal, 'd'), cdbm_own_fact(now, goal, 't'));
+        if (own) PyTuple_SetItem(facts, (Py_ssize_t)i, own);
+        else cdbp_clear(&facts);
+    }
+    return facts;
+}
+
+/* ways.go_on(controllers, walks, goals, bodies or None, seconds, rows, poses or None, after, moved, queries, places): characters some
+ * time later, what they play, and the queries that ask for the paths that they wish to take; where their bodies are. Gives of each its
+ * speed, the direction of its stick, and its turn. The goals are an array, or that of one a tuple; a body that is NaN follows its goal, a
+ * pose that is NaN is that of what plays. */
 static PyObject *cdbp_ways_go_on(PyObject *self, PyObject *const *in, Py_ssize_t n)
 {
     const cdbm_ways *ways = cdbp_made_ways(self);
@@ -171,10 +194,10 @@ static PyObject *cdbp_ways_go_on(PyObject *self, PyObject *const *in, Py_ssize_t
     cdbp_arrays a;
     cdbp_onward to;
     double *room = NULL, *mean;
+    PyObject *facts = NULL;
     size_t d, i;
-    int is_done = 0;
     a.n = 0;
-    if (ways && n == 12 && cdbp_is_freed_by(Py_TYPE(in[0]), cdbp_controller_free) && ((cdbp_controller *)in[0])->is_made)
+    if (ways && n == 11 && cdbp_is_freed_by(Py_TYPE(in[0]), cdbp_controller_free) && ((cdbp_controller *)in[0])->is_made)
         controller = &((cdbp_controller *)in[0])->controller;
     if (controller && cdbp_take_onward(ways, controller, &a, in + 1, &to)
         && (controller->n_features == 0 || controller->n_features == ways->n_features)) {
@@ -186,9 +209,11 @@ static PyObject *cdbp_ways_go_on(PyObject *self, PyObject *const *in, Py_ssize_t
             if (controller->databases[d].frames) memcpy(mean, controller->databases[d].frames->offset, ways->n_features * sizeof *mean);
         for (i = 0; i < to.n; i++) cdbp_go_onward(ways, controller, mean, &to, i, room + ways->n_features);
         PyMem_Free(room);
-        is_done = 1;
+        facts = cdbp_own_facts(ways, &to);
     }
-    return cdbp_given_back(&a, is_done, "go_on takes controllers of the same features, walks, goals, bodies, seconds, rows, poses and arrays");
+    if (!facts) return cdbp_given_back(&a, 0, "go_on takes controllers of the same features, walks, goals, bodies, seconds, rows, poses and arrays");
+    cdbp_release(&a);
+    return facts;
 }
 
 /* ways.rest(walks, mean, poses): the poses of characters that play nothing. */

@@ -70,6 +70,18 @@ def test_what_plays_mirrored_plays_on_while_the_mirrored_facts_allow_it(database
     assert "not valid" in jumped.why
 
 
+def test_where_no_clip_is_mirrored_no_answer_with_mirrored_facts_is_asked_for():
+    class Unmirrored(NamedAssets):
+        @property
+        def mirrored(self):
+            raise AssertionError("nobody asks")
+
+    schema = FeatureSchema.from_dict("loco", {"rate": 30.0, "channels": [{"type": "position", "bone": "LeftFoot"}]})
+    plain = MotionDatabase.build([make_clip(name).clip for name in TURNS], schema)
+    one = Controller(Selector([Entry("a", plain)]))
+    assert one.update(DT, plain.raw(0), Unmirrored([TURNS[1]])).playing.asset == TURNS[1]
+
+
 def test_what_plays_mirrored_stays_valid_by_the_hysteresis_of_mirrored_facts(database):
     direction = {"type": "angle", "hysteresis": 10.0}
     compiled = cdb.Table.from_columns(COLUMNS, {"direction": direction}).compile()

@@ -69,8 +69,9 @@ def test_poses_are_those_of_the_oracle(seed):
         dt, below = step if i else 0.0, None if i >= leaves_at else ground
         rows, at = stream._place
         own, row = stream._pipeline, rows.row(at)
-        given, seams, _ = own.given(row, own.plays_of(row, [decision], None if below is None else [below]), dt)
-        expected, state = pose_oracle.posed(list(banks.values()), settings, state, given[0], seams, dt, place, below)
+        grounds = None if below is None else (below,)
+        made = own.update(row, [decision], own.plays_of(row, [decision], grounds), dt, np.array([place]), grounds)[1]
+        expected, state = pose_oracle.posed(list(banks.values()), settings, state, made.given[0], made.seams, dt, place, below)
         pose = stream.update(decision, dt, place, below)
         displayed = pose.rotations, pose.translations, pose.positions, pose.root, pose.contacts
         for one, other in zip(displayed, expected, strict=True):

@@ -8,6 +8,8 @@ from strategies import for_each
 from contextdb import core
 from contextdb.motion import PoseSettings
 from contextdb.motion.output import pipeline as pipelines
+from contextdb.motion.output.ground import below
+from contextdb.motion.output.pose import N_MADE
 
 RIG = bank().skeleton
 LEGS = pipelines.legs_of(RIG, bank().feet)
@@ -87,43 +89,50 @@ def test_a_rig_that_does_not_go_with_its_banks_is_refused(name, change):
         poses(**{name: change})
 
 
+def slope(x, z):
+    return 0.1 * z, (0.0, 0.995, -0.0995)
+
+
 def updated(own, at=0, number=0.0, **changed):
-    """An update of two characters, with one number of what is given another one."""
+    """An update of two characters, with one number of what plays another one."""
     n, joints, feet = 2, RIG.n_joints, len(bank().feet)
     before = np.empty((n, own.width))
     for row in before:
         own.begin(row)
-    given = np.zeros((n, pipelines.N_GIVEN))
-    given[:, 11] = -1.0
-    given[1, at] = number
+    plays = np.zeros((n, pipelines.N_PLAY))
+    plays[1, at] = number
+    made = np.empty(n * (N_MADE + 10 * joints))
     arrays = {
-        **{"before": before, "given": given, "places": None, "seams": None, "dt": 0.1, "after": np.empty_like(before)},
-        **{"roots": np.empty((n, 3)), "rotations": np.empty((n, joints, 4)), "translations": np.empty((n, joints, 3))},
-        **{"positions": np.empty((n, joints, 3)), "contacts": np.empty((n, feet), np.bool_), "points": None, "below": None},
+        **{"before": before, "plays": plays, "places": None, "dt": 0.1, "grounds": None, "after": np.empty_like(before)},
+        **{"displayed": np.empty((n, 3)), "roots": np.empty((n, 3)), "made": made},
+        **{"contacts": np.empty((n, feet), np.bool_), "moves_body": np.empty(n, np.bool_), "ask": below},
     }
     own.update(*(arrays | changed).values())
-    return arrays["rotations"]
+    return made[n * N_MADE :]
 
 
-@pytest.mark.parametrize(("at", "number"), [(0, 1.0), (0, np.inf), (1, -1.0), (1, 1e300), (1, np.nan), (11, 0.0), (11, 7.0)])
-def test_a_moment_or_a_seam_that_is_not_there_is_refused(at, number):
+@pytest.mark.parametrize("at", [0, 3, 6])
+@pytest.mark.parametrize(("number", "apart"), [(1.0, 0), (np.inf, 0), (-1.0, 1), (1e300, 1), (np.nan, 1)])
+def test_a_moment_that_is_not_there_is_refused(at, number, apart):
+    """Of what plays, would play or was displayed: another bank, another range."""
     own = poses()
     assert np.isfinite(updated(own)).all()
-    with pytest.raises(ValueError, match="is in no bank, a seam that is not there"):
-        updated(own, at, number)
+    with pytest.raises(ValueError, match="is in no bank"):
+        updated(own, at + apart, number)
 
 
 @pytest.mark.parametrize(
     "changed",
     [
         {"before": np.zeros((2, 5))},
+        {"plays": np.zeros((2, 5))},
         {"after": np.zeros((1, 5))},
-        {"rotations": np.zeros((2, 3, 4))},
+        {"displayed": np.zeros((2, 2))},
+        {"made": np.zeros(7)},
         {"contacts": np.zeros((2, 2))},
-        {"seams": np.full((2, 4), 5.0)},
+        {"moves_body": np.zeros(2)},
         {"places": np.zeros((1, 3))},
         {"roots": np.broadcast_to(0.0, (2, 3))},
-        {"points": np.zeros((2, 2, 2)), "below": np.zeros((2, 2, 3))},
         {"dt": "soon"},
     ],
 )
@@ -132,10 +141,17 @@ def test_arrays_of_another_shape_are_refused(changed):
         updated(poses(), **changed)
 
 
+@pytest.mark.parametrize("ask", [1, lambda _, points: [], lambda _, points: [None] * len(points), lambda *_: 1 / 0])
+@pytest.mark.parametrize("grounds", [slope, (slope, slope), (slope,)])
+def test_a_ground_that_gives_no_heights_is_refused(ask, grounds):
+    with pytest.raises((ValueError, TypeError, IndexError, ZeroDivisionError)):
+        updated(poses(), 15, 1.0, grounds=grounds, ask=ask)
+
+
 @pytest.mark.parametrize("number", [np.nan, np.inf, -1e300])
 def test_numbers_that_no_game_gives_lead_nowhere(number):
     """Of a second, a rate and a movement that are none: what comes out is no pose, and nothing else is written or read."""
-    for at in (2, 5, 6, 8, 9):
+    for at in (2, 5, 8, 9, 10, 11, 13, 14, 15, 16, 17):
         updated(poses(), at, number)
 
 

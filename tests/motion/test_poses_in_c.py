@@ -121,8 +121,8 @@ def test_poses_are_the_same_bits_by_all_compilers_and_in_python(tmp_path):
         dt, place = step if decision.tick else 0.0, (0.01 * decision.tick, 0.05 * decision.tick, 0.02 * decision.tick)
         rows, at = stream._place
         own, row = stream._pipeline, rows.row(at)
-        given, seams, _ = own.given(row, own.plays_of(row, [decision], [slope]), dt)
-        seams = np.zeros((0, 4)) if seams is None else seams
+        made = own.update(row, [decision], own.plays_of(row, [decision], (slope,)), dt, np.array([place]), (slope,))[1]
+        given, seams = made.given, made.seams if made.given[0, 11] >= 0.0 else np.zeros((0, 4))
         ticks.append(struct.pack("dq", dt, len(seams)) + padded(given) + padded(np.array(place)) + padded(seams))
         pose = stream.update(decision, dt, place, slope)
         arrays = stream.state.row, np.array(pose.root), pose.rotations, pose.translations, pose.positions

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from typing import Unpack
+from typing import Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,8 +29,8 @@ from contextdb.motion.characters import walks
 from contextdb.motion.characters.facts import FACTS, FactOf, Ground, Moment
 from contextdb.motion.characters.played import Played
 from contextdb.motion.characters.project import HasTables, Parts
-from contextdb.motion.characters.tables import Facts, OwnFacts, Tables, Unknown
-from contextdb.motion.characters.updates import UNKNOWN, Options, Paths, Step, Updated
+from contextdb.motion.characters.tables import Facts, OwnFacts, Table, Tables, Unknown
+from contextdb.motion.characters.updates import UNKNOWN, More, Options, Paths, Step, Updated
 from contextdb.motion.characters.walks import WishedPaths
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
@@ -40,7 +40,7 @@ from contextdb.motion.nodes.warping import Target
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.ground import Ground as HeightOf
 from contextdb.motion.output.stream import PoseStream
-from contextdb.motion.selection.controller import Asked, Clock, Controller, Decided, update_all
+from contextdb.motion.selection.controller import Asked, Clock, Controller, Decided, nothing_asked, update_all
 from contextdb.motion.selection.controller import Place as ControllerPlace
 from contextdb.motion.selection.decision import Playing, plays
 from contextdb.motion.selection.events import Event
@@ -232,7 +232,7 @@ class Character:
     @property
     def _row(self) -> Floats:
         """The character's walk: [1, W]."""
-        return walks.fitted(self.schema.ways, self._rows[self._at : self._at + 1])
+        return walks.fitted(self.schema.ways, self._rows if len(self._rows) == 1 else self._rows[self._at : self._at + 1])
 
     @property
     def root(self) -> RootMotion:
@@ -313,11 +313,10 @@ class Character:
             Facts that a table refuses, or an argument that cannot be used. The character then stands where it stood.
         """
         step = self._step(dt, stick, facts, facing, body, path)
-        if "valid" not in options:
-            options["valid"] = self._valid(step.facts)
+        valid = options.pop("valid") if "valid" in options else self._valid(step.facts)
         on, own, before = step.on, [self.controller], self.controller.place
-        asked, contexts = Asked.of_one(**options), [step.facts or None]
-        decided = update_all(own, step.dt_s, on.queries, asked, contexts, on.places, on.moved)
+        asked = Asked.of_one(**cast("More", options)) if options else nothing_asked(1)
+        decided = update_all(own, step.dt_s, on.queries, valid, asked, [step.facts or None], on.places, on.moved)
         return self._answer(step, decided, before)
 
     # ---- over a network
@@ -368,32 +367,41 @@ class Character:
     ) -> Step:
         dt = require_real(dt, "dt", 0.0)
         stick = require_point(stick, "stick", "two numbers, x and z in metres a second")
-        given = {} if facts is None else require_mapping(facts, "facts", "a mapping of names to facts")
-        require_kind(body, (Steered, type(None)), "body", "a Steered")
-        require_kind(path, (Trajectory, type(None)), "path", "a Trajectory over the ground")
+        given = {} if facts is None else facts
+        if type(given) is not dict:
+            require_mapping(given, "facts", "a mapping of names to facts")
+        if body is not None:
+            require_kind(body, Steered, "body", "a Steered")
+        if path is not None:
+            require_kind(path, Trajectory, "path", "a Trajectory over the ground")
         if facing is not None:
             require_real(facing, "facing")
         goal = *stick, walks.UNKNOWN if facing is None else facing
-        goals, pose = np.array([goal], np.float64), None if self.pose is None else self._given_pose(dt)[None]
-        on = walks.onward(self.schema, self.controller.chooser, self._row, goals, dt, self.controller.row, pose, body)
-        paths: Paths = WishedPaths(self.schema, on.walks, goals)
+        pose = None if self.pose is None else self._given_pose(dt)[None]
+        on = walks.onward(self.schema, *self.controller.stand, self._row, goal, dt, pose, body)
+        paths: Paths = WishedPaths(self.schema, on.walks, goal)
         if path is not None:
             paths, queries = walks.wished_along(self.schema, on.walks, path, on.queries)
             on = on._replace(queries=queries)
-        return Step(dt, on, self._with_own(given, dt, goal, on.facts[0].tolist(), on.walks, 0), paths)
+        return Step(dt, on, self._with_own(given, dt, goal, on.facts[0], on.walks, 0), paths)
 
     def _with_own(
         self, given: Facts, dt: float, goal: tuple[float, float, float], numbers: Sequence[float], rows: Floats, i: int
     ) -> Facts:
         """The facts of the game and the character's own, whose walk is one of some rows."""
         asked = self._own_facts
-        own: dict[str, object] = {name: numbers[at] for name, at in asked.of_body.items()}
+        own: dict[str, object] = {}
+        for name, at in asked.of_body.items():
+            own[name] = numbers[at]
         if asked.others and any(name not in given for name in asked.others):
             x, z, heading = goal
             facing, body = None if math.isnan(heading) else heading, walks.body_of(rows, i)
             moment = Moment(dt, (x, z), facing, body, self.playing, self._played())
             own |= {name: of(moment) for name, of in asked.others.items() if name not in given}
-        return {**own, **given} if own else given
+        if not own:
+            return given
+        own.update(given)
+        return own
 
     def _played(self) -> Played | None:
         """What plays, with what it is of."""
@@ -418,10 +426,11 @@ class Character:
 
     def _valid(self, facts: Facts) -> OfValid | None:
         """What the tables allow with some facts."""
-        answers: dict[int, Answer] = {
-            id(table): asking.answer(table, facts, self.unknown) for table in asking.each_of(self._tables)
-        }
-        return asking.valid_of(self._tables, answers)
+        tables = self._tables
+        if not isinstance(tables, dict):
+            return None if tables is None else asking.answer(cast("Table", tables), facts, self.unknown)
+        answers: dict[int, Answer] = {id(table): asking.answer(table, facts, self.unknown) for table in asking.each_of(tables)}
+        return asking.valid_of(tables, answers)
 
     def _answer(self, step: Step, decided: Decided, before: ControllerPlace) -> Updated:
         """The pose after a decision; `before` is where the controller stood."""

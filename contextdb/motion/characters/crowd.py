@@ -127,7 +127,7 @@ class Crowd(ListSequence[Character]):
             raise MotionError(Fault("the characters have different features.", "characters of one feature schema"))
         goals, given = _goals(sticks, facing, len(self)), _facts_of_each(facts, len(self))
         on = self._onward(dt, goals)
-        each = zip(self, given, goals.tolist(), on.facts.tolist(), strict=True)
+        each = zip(self, given, goals.tolist(), on.facts, strict=True)
         facts_of = [one._with_own(own, dt, goal, numbers, on.walks, i) for i, (one, own, goal, numbers) in enumerate(each)]
         group = ControllerGroup(character.controller for character in self)
         valid = self._valid(facts_of)
@@ -148,20 +148,30 @@ class Crowd(ListSequence[Character]):
 
     def _onward(self, dt: float, goals: Floats) -> Onward:
         """All some time later: those of each chooser together."""
-        schema, rows, poses = self[0].schema, np.concatenate([character._row for character in self]), None
+        schema, rows, poses = self[0].schema, self._rows(), None
         if any(character.pose is not None for character in self):
             plain = np.full(schema.n_features, math.nan)
             poses = np.array([plain if character.pose is None else character._given_pose(dt) for character in self])
         parts = []
-        for numbers in _alike({i: character.controller.chooser for i, character in enumerate(self)}, is_):
+        for numbers in _alike({i: character.controller.chooser for i, character in enumerate(self)}, id, is_):
             own, chooser = [self[i].controller for i in numbers], self[numbers[0]].controller.chooser
-            given = None if poses is None else poses[numbers]
-            part = walks.onward(schema, chooser, rows[numbers], goals[numbers], dt, rows_of(own), given)
             if len(numbers) == len(self):
-                return part
-            parts.append((numbers, part))
+                return walks.onward(schema, chooser, rows_of(own), rows, goals, dt, poses)
+            given = None if poses is None else poses[numbers]
+            parts.append((numbers, walks.onward(schema, chooser, rows_of(own), rows[numbers], goals[numbers], dt, given)))
         order = np.argsort([i for numbers, _ in parts for i in numbers])
-        return Onward(*(np.concatenate(arrays)[order] for arrays in zip(*(part for _, part in parts), strict=True)))
+        *arrays, facts = zip(*(part for _, part in parts), strict=True)
+        together = [own for each in facts for own in each]
+        after, moved, queries, places = (np.concatenate(each)[order] for each in arrays)
+        return Onward(after, moved, queries, places, [together[i] for i in order])
+
+    def _rows(self) -> Floats:
+        """The walks of all: as the last update left them, unless one was elsewhere meanwhile."""
+        first = self[0]._rows
+        is_whole = len(first) == len(self) and first.shape[1] == self[0].schema.ways.width
+        if is_whole and all(own._rows is first and own._at == i for i, own in enumerate(self._items)):
+            return first
+        return np.concatenate([character._row for character in self])
 
     def _posed(self, dt: float, decided: Decided, places: Floats) -> tuple[Sequence[Pose | None], Floats, Flags]:
         """The poses of all, None without a stream; their roots, the body's without one; and whether the clip moves the body. Those
@@ -172,11 +182,11 @@ class Crowd(ListSequence[Character]):
             for alike in self._equal_streams(of_updates):
                 numbers = [of_updates[k] for k in alike]
                 part = updates if len(alike) == len(of_updates) else updates._replace(decisions=updates.decisions[alike])
-                streams = PoseStreams(stream for i in numbers if (stream := self[i].stream) is not None)
-                below = [grounds[i] for i in numbers]
+                streams = PoseStreams.of_like([stream for i in numbers if (stream := self[i].stream) is not None])
+                below = tuple(grounds[i] for i in numbers)
                 own = decisions if len(numbers) == len(self) else [decisions[i] for i in numbers]
                 groups.append((numbers, streams, *streams.updated(part, own, dt, places[numbers], below if any(below) else None)))
-        for numbers, streams, poses, rows, moves in groups:
+        for numbers, streams, rows, poses, moves in groups:
             streams.go_on(rows)
             if len(numbers) == len(self):
                 return poses, poses.roots, moves
@@ -188,13 +198,13 @@ class Crowd(ListSequence[Character]):
     def _equal_streams(self, numbers: Sequence[int]) -> list[list[int]]:
         """Of some characters the places of those with a stream, those together that have the same banks and settings."""
         streams = {k: own for k, i in enumerate(numbers) if (own := self[i].stream) is not None}
-        return _alike(streams, PoseStream.is_like)
+        return _alike(streams, PoseStream.kind, PoseStream.is_like)
 
     def _valid(self, facts_of: list[Facts]) -> Any:
         """What may play of each: every table is asked once with the facts of all who have the same tables."""
         asked = {i: (character.tables, character.unknown) for i, character in enumerate(self)}
         valid: list[OfValid | None] = [None] * len(self)
-        for numbers in _alike(asked, eq):
+        for numbers in _alike(asked, lambda own: (id(own[0]), own[1]), eq):
             tables, unknown = asked[numbers[0]]
             facts = [facts_of[i] for i in numbers]
             answers: dict[int, Any] = {id(table): _answers(table, facts, unknown) for table in asking.each_of(tables)}
@@ -205,15 +215,18 @@ class Crowd(ListSequence[Character]):
         return valid
 
 
-def _alike(things: Mapping[int, T], is_like: Callable[[T, T], bool]) -> list[list[int]]:
-    """The numbers of some things, those of like things together."""
+def _alike(things: Mapping[int, T], key: Callable[[T], object], is_like: Callable[[T, T], bool]) -> list[list[int]]:
+    """The numbers of some things, those of like things together; things of one key are like each other."""
     groups: list[list[int]] = []
+    by_key: dict[object, list[int]] = {}
     for i, own in things.items():
-        known = next((numbers for numbers in groups if is_like(own, things[numbers[0]])), None)
-        if known is None:
-            groups.append([i])
-        else:
-            known.append(i)
+        numbers = by_key.get(at := key(own))
+        if numbers is None:
+            numbers = next((each for each in groups if is_like(own, things[each[0]])), [])
+            by_key[at] = numbers
+            if not numbers:
+                groups.append(numbers)
+        numbers.append(i)
     return groups
 
 

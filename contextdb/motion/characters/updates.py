@@ -23,10 +23,9 @@ UNKNOWN = ("error", "any", "never")
 Paths = ManyTrajectories | WishedPaths
 
 
-class Options(TypedDict, total=False):
-    """What a controller is asked with beside the query; see `Controller.update`."""
+class More(TypedDict, total=False):
+    """What a controller is asked with beside the query and what is valid; see `Controller.update`."""
 
-    valid: OfValid | None
     tags: OfTags | None
     bias: Mapping[str, ArrayLike] | None
     penalties: OfPenalties | None
@@ -34,6 +33,12 @@ class Options(TypedDict, total=False):
     force: bool
     interrupt: bool
     event: Event | None
+
+
+class Options(More, total=False):
+    """And what is valid."""
+
+    valid: OfValid | None
 
 
 def _at(body: Steered) -> str:

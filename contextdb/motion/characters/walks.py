@@ -6,7 +6,7 @@ Q characters, W numbers in a row, F features; see `contextdb/core/walk.h`. Nothi
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -27,6 +27,8 @@ from contextdb.motion.selection.root_motion import RootMotion
 N_WALK = N_NUMBERS + 4
 """So many numbers a walk is before the places where the animation was."""
 UNKNOWN = math.nan
+Goal = tuple[float, float, float]
+"""What a stick asks for, x and z in m/s and a heading; also what a character knows of itself."""
 
 
 def begun(ways: Ways, body: Steered) -> Floats:
@@ -64,19 +66,25 @@ def apart_of(row: Floats) -> RootMotion:
 
 class Onward(NamedTuple):
     """Characters some time later, before their poses are displayed: their walks [Q, W]; what has moved [Q, 16] and the queries that
-    ask for what they wish [Q, F], as their controllers take them; where their bodies are [Q, 3]; and their own facts [Q, 3]."""
+    ask for what they wish [Q, F], as their controllers take them; where their bodies are [Q, 3]; and of each its own facts."""
 
     walks: Floats
     moved: Floats
     queries: Floats
     places: Floats
-    facts: Floats
+    facts: Sequence[Goal]
 
 
 def onward(
-    schema: FeatureSchema, chooser: Chooser, walks: Floats, goals: Floats, dt_s: float, rows: Floats, poses: Floats | None = None,
+    schema: FeatureSchema,
+    chooser: Chooser,
+    rows: Floats,
+    walks: Floats,
+    goals: Floats | Goal,
+    dt_s: float,
+    poses: Floats | None = None,
     body: Steered | None = None,
-) -> Onward:  # fmt: skip
+) -> Onward:
     """Characters of one chooser, whose rows these are, some time later. `poses` [Q, F] are given where they are not those of what
     plays, NaN where they are; and the `body` of one where the game puts it. Raises MotionError for databases of other features."""
     n = len(walks)
@@ -84,15 +92,14 @@ def onward(
         problem = f"the databases have {plural(chooser.n_features, 'feature')}, the schema {schema.n_features}."
         raise MotionError(Fault(problem, "databases of one schema"))
     bodies = None if body is None else np.array([body.numbers])
-    made = np.empty_like(walks), np.empty((n, N_MOVED)), np.empty((n, schema.n_features)), np.empty((n, 3)), np.empty((n, 3))
-    schema.ways.go_on(chooser.core, walks, goals, bodies, dt_s, rows, poses, *made)
-    return Onward(*made)
+    made = np.empty_like(walks), np.empty((n, N_MOVED)), np.empty((n, schema.n_features)), np.empty((n, 3))
+    return Onward(*made, schema.ways.go_on(chooser.core, walks, goals, bodies, dt_s, rows, poses, *made))
 
 
 class WishedPaths(Made[Trajectory]):
     """The paths that characters wish to take if their sticks stay as they are: worked out when one is requested."""
 
-    def __init__(self, schema: FeatureSchema, walks: Floats, goals: Floats) -> None:
+    def __init__(self, schema: FeatureSchema, walks: Floats, goals: Floats | Goal) -> None:
         self._schema, self._walks, self._goals = schema, walks, goals
 
     def __len__(self) -> int:
@@ -105,9 +112,10 @@ class WishedPaths(Made[Trajectory]):
     def together(self) -> ManyTrajectories:
         """All of them."""
         ways, walks, n_features = self._schema.ways, self._walks, self._schema.n_features
-        n, n_frames = len(walks), ways.n_frames(walks, self._goals)
+        goals = np.array(self._goals, np.float64, ndmin=2)
+        n, n_frames = len(walks), ways.n_frames(walks, goals)
         positions, headings, poses = np.empty((n, n_frames, 2)), np.empty((n, n_frames)), np.zeros((n, n_features))
-        ways.ask(walks, self._goals, self._schema.rate, poses, positions, headings, np.empty_like(poses))
+        ways.ask(walks, goals, self._schema.rate, poses, positions, headings, np.empty_like(poses))
         return ManyTrajectories(self._schema.rate, positions, headings, ways.n_behind(self._schema.rate))
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from contextdb.cells.arguments import require_real
+from contextdb.core import risen
 from contextdb.errors import ContextError, Fault
 from contextdb.motion.clips.quaternions import Floats
 
@@ -34,12 +35,16 @@ def below(ground: Ground | None, x: float, z: float) -> Triple:
     answer = None if ground is None else ground(x, z)
     if answer is None:
         return LEVEL
+    return risen(answer, STEEPEST) or _risen(answer, x, z)  # mostly the first
+
+
+def _risen(answer: Any, x: float, z: float) -> Triple:
+    """The same of any answer."""
     try:
         height, (nx, ny, nz) = answer
     except (TypeError, ValueError):
         raise ContextError(Fault(f"the ground at ({x:g}, {z:g}) is {answer!r}.", A_GROUND)) from None
-    if not (type(height) is type(nx) is type(ny) is type(nz) is float and math.isfinite(height + nx + ny + nz)):  # as mostly
-        height, nx, ny, nz = (require_real(each, "the ground's height or normal") for each in (height, nx, ny, nz))
+    height, nx, ny, nz = (require_real(each, "the ground's height or normal") for each in (height, nx, ny, nz))
     if ny <= 0.0:
         raise ContextError(Fault(f"the ground's normal at ({x:g}, {z:g}) is {(nx, ny, nz)}.", "a normal upwards: y above 0"))
     along_x, along_z = -nx / ny, -nz / ny
@@ -68,16 +73,5 @@ def below_many(ground: ManyGround, points: Sequence[tuple[float, float]]) -> lis
     return [(height, x, z) for height, (x, z) in zip(heights.tolist(), (share[:, None] * rise).tolist(), strict=True)]
 
 
-Grounds = Sequence[Ground | None] | ManyGround
-
-
-def below_all(grounds: Grounds, points: Floats) -> Floats:
-    """Height and rise of the ground at the points of N characters [N, K, 2], those that are NaN left out: [N, K, 3]."""
-    rows: list[list[list[float]]] = points.tolist()
-    if isinstance(grounds, Sequence):
-        each = zip(grounds, rows, strict=True)
-        heights = [[LEVEL if ground is None or x != x else below(ground, x, z) for x, z in own] for ground, own in each]
-    else:
-        flat = iter(below_many(grounds, [(x, z) for own in rows for x, z in own if x == x]))
-        heights = [[next(flat) if x == x else LEVEL for x, _ in own] for own in rows]
-    return np.array(heights, np.float64)
+Grounds = tuple[Ground | None, ...] | ManyGround
+"""One for each of some characters, or one for all."""

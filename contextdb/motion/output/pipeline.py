@@ -12,16 +12,16 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_mapping
 from contextdb.cells.row_play import ROOTS, RowPlay
-from contextdb.core import Poses, fill_plays, pose_columns
+from contextdb.core import Poses, fill_plays
 from contextdb.errors import Fault, MotionError, in_quotes, no_such
 from contextdb.files.settings import settings_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints, Skeleton
 from contextdb.motion.output.bank import RIG_MEND, PoseBank
 from contextdb.motion.output.clip_parts import tops_of
-from contextdb.motion.output.ground import Grounds, below_all
+from contextdb.motion.output.ground import Grounds, below, below_many
 from contextdb.motion.output.legs import hinges_of, legs_of
-from contextdb.motion.output.pose import CrowdPoses
+from contextdb.motion.output.pose import N_MADE, CrowdPoses
 from contextdb.motion.output.samples import Flags
 from contextdb.motion.output.settings import PoseSettings
 from contextdb.motion.records import quickly_made
@@ -32,13 +32,8 @@ ADDED_SHARE = 0.75
 """What is added to the clips may accelerate joints by this share of what the clips do; the rest is left for the clips."""
 NUMBERS = {action: float(number) for number, action in enumerate(Action)}
 """What an update did, as the core has it."""
-COLUMNS = pose_columns()
-"""Where each single number of a row is."""
-PLAY_RATE, CLIP_RATE = COLUMNS["play_rate"], COLUMNS["clip_rate"]
-N_GIVEN, N_PLAY, ROOT = 16, 18, 17
-"""So many numbers the core is given of a character, see `cdbo_given` in pose.h; and so many that this comes from, with the place of
-what moves the root, see `cdbo_play` in receive.h."""
-BY_ANIMATION, MOST_CHOOSERS = float(ROOTS.index("animation")), 16
+N_PLAY, MOST_CHOOSERS = 18, 16
+"""So many numbers say what poses of a character are made of, see `cdbo_play` in receive.h."""
 Moment = tuple[int, int, float]
 NO_MOMENT: Moment = (-1, 0, 0.0)
 """A moment of a bank: its number, a range and a second; nothing."""
@@ -101,10 +96,15 @@ class Pipeline:
     def _grounded(self) -> Poses:
         return _poses(self.all, self.settings, feels_ground=True)
 
-    @property
+    @cached_property
     def width(self) -> int:
         """How many numbers a row has."""
         return self._flat.width
+
+    @cached_property
+    def _sizes(self) -> tuple[int, int]:
+        """How many joints and feet the rig has."""
+        return self.rig.n_joints, len(self.rig.feet)
 
     def begun(self) -> Rows:
         """One character that has not displayed anything yet: the rig at rest."""
@@ -118,37 +118,33 @@ class Pipeline:
 
     def update(
         self, rows: Rows, decisions: list[Decision], plays: Floats, dt: float, places: Floats | None, grounds: Grounds | None
-    ) -> tuple[Rows, CrowdPoses]:
+    ) -> tuple[Rows, CrowdPoses, Flags]:
         """The rows and the poses of all after a decision for each, and what `plays` by it; `places` [N, 3] are those of the bodies,
-        NaN for none."""
-        given, seams, displayed = self.given(rows, plays, dt)
-        n, n_joints, n_feet = len(rows), self.rig.n_joints, len(self.rig.feet)
-        after, roots, contacts = np.empty((n, self.width)), np.empty((n, 3)), np.empty((n, n_feet), np.bool_)
-        rotations, translations, positions = np.empty((n, n_joints, 4)), np.empty((n, n_joints, 3)), np.empty((n, n_joints, 3))
-        bodies = None if places is None else np.ascontiguousarray(places)
-        arrays = rows.numbers, given, bodies, seams, dt, after, roots, rotations, translations, positions, contacts
-        if grounds is None:
-            self._flat.update(*arrays, None, None)
-        else:
-            points = np.empty((n, max(n_feet, 1), 2))
-            self._grounded.update(*arrays, points, None)
-            self._grounded.update(*arrays, None, below_all(grounds, points))
-        each = zip(plays[:, 0].tolist(), decisions, rows.last, strict=True)
-        last = [was if bank < 0.0 else decision for bank, decision, was in each]
-        poses = CrowdPoses(decisions, given, roots, rotations, translations, positions, contacts, after[:, PLAY_RATE])
-        return Rows(after, displayed, last), poses
+        NaN for none. And whether the clip alone moves the body of each, as the row of what plays or the settings say: bool [N]."""
+        n, (n_joints, n_feet) = len(rows.last), self._sizes
+        core, ask = self._flat if grounds is None else self._grounded, below if isinstance(grounds, tuple) else below_many
+        after, displayed, roots = np.empty((n, self.width)), np.empty((n, 3)), np.empty((n, 3))
+        made, contacts, moves_body = np.empty(n * (N_MADE + 10 * n_joints)), np.empty((n, n_feet), np.bool_), np.empty(n, np.bool_)
+        last: list[Displayed] = list(decisions)
+        if not core.update(rows.numbers, plays, places, dt, grounds, after, displayed, roots, made, contacts, moves_body, ask):
+            each = zip(plays[:, 0].tolist(), decisions, rows.last, strict=True)
+            last = [was if bank < 0.0 else decision for bank, decision, was in each]
+        poses = CrowdPoses(decisions, roots, contacts, after, made, n_joints)
+        return Rows(after, displayed, last), poses, moves_body
 
-    def given(self, rows: Rows, plays: Floats, dt: float) -> tuple[Floats, Floats | None, Floats]:
-        """What happens in this update, a row each; the moments at seams, two for each, or None; and what is displayed then."""
-        n = len(rows)
-        given, moments, displayed = np.empty((n, N_GIVEN)), np.empty((2 * n, 4)), np.empty((n, 3))
-        n_seams = self._flat.receive(rows.numbers, plays, dt, given, moments, displayed)
-        return given, moments[:n_seams] if n_seams else None, displayed
-
-    def moves_body(self, plays: Floats) -> Flags:
-        """Whether the clip alone moves the body of each, as the row of what plays or the settings say: bool [N]."""
-        by_settings = self.settings.root == "animation"
-        return np.array([by_settings if root != root else root == BY_ANIMATION for root in plays[:, ROOT].tolist()], np.bool_)
+    def decided(
+        self, rows: Rows, updates: Updates, decisions: list[Decision], dt: float, places: Floats | None, grounds: Grounds | None
+    ) -> tuple[Rows, CrowdPoses, Flags]:
+        """The same by the decisions of some updates, which the core has already."""
+        known = self._places.get(updates.chooser)
+        if known is None:
+            if len(self._places) >= MOST_CHOOSERS:
+                self._places.clear()
+            known = self._places[updates.chooser] = self._places_of(updates.chooser)
+        plays = np.empty((len(rows.last), N_PLAY))
+        if not fill_plays(updates.decisions, *known, rows.displayed, grounds, plays):
+            plays = self.plays_of(rows, decisions, grounds)
+        return self.update(rows, decisions, plays, dt, places, grounds)
 
     def find(self, playing: Playing) -> tuple[int, int]:
         """The number of the bank of what plays, and its range there."""
@@ -172,27 +168,16 @@ class Pipeline:
     def plays_of(self, rows: Rows, decisions: Sequence[Decision], grounds: Grounds | None) -> Floats:
         """What poses are made of, by decisions from anywhere: float64 [N, 18]. Raises MotionError where no bank has what plays."""
         plays: list[float] = []
-        each = zip(decisions, rows.displayed.tolist(), _gives(grounds, len(rows)).tolist(), strict=True)
-        for decision, displayed, ground in each:
+        of_each = grounds if isinstance(grounds, tuple) else [grounds] * len(rows)
+        for decision, displayed, ground in zip(decisions, rows.displayed.tolist(), of_each, strict=True):
             motion, playing, before = decision.root_motion, decision.playing, decision.before
             plays += (
                 *self.moment_of(playing), *self.moment_of(before), *displayed,
                 NUMBERS[decision.action], decision.play_rate,
-                motion.left_m, motion.ahead_m, motion.turn_rad, decision.root_weight, ground,
+                motion.left_m, motion.ahead_m, motion.turn_rad, decision.root_weight, ground is not None,
                 *_numbers_of(decision.play),
             )  # fmt: skip
         return np.array(plays, np.float64).reshape(len(rows), N_PLAY)
-
-    def plays_in(self, rows: Rows, updates: Updates, decisions: Sequence[Decision], grounds: Grounds | None) -> Floats:
-        """The same of the decisions of some updates, which the core has already."""
-        places = self._places.get(updates.chooser)
-        if places is None:
-            if len(self._places) >= MOST_CHOOSERS:
-                self._places.clear()
-            places = self._places[updates.chooser] = self._places_of(updates.chooser)
-        plays = np.empty((len(rows), N_PLAY))
-        is_whole = fill_plays(updates.decisions, *places, rows.displayed, _gives(grounds, len(rows)), plays)
-        return plays if is_whole else self.plays_of(rows, decisions, grounds)
 
     def _places_of(self, chooser: Chooser) -> tuple[Ints, Ints, Ints]:
         """Where the ranges of each database begin, the bank of each, and the range there of each of their ranges; -1 for none."""
@@ -216,13 +201,6 @@ def _numbers_of(play: RowPlay | None) -> tuple[float, float]:
     if play is None:
         return math.nan, math.nan
     return math.nan if play.blend_s is None else play.blend_s, math.nan if play.root is None else float(ROOTS.index(play.root))
-
-
-def _gives(grounds: Grounds | None, n: int) -> Flags:
-    """Who stands on a ground."""
-    if isinstance(grounds, Sequence):
-        return np.array([each is not None for each in grounds], np.bool_)
-    return np.full(n, grounds is not None)
 
 
 def _poses(banks: Sequence[PoseBank], settings: PoseSettings, *, feels_ground: bool) -> Poses:

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
 
 from contextdb.cells.sequences import Made
+from contextdb.core import pose_columns
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.samples import Flags, Place3
 from contextdb.motion.records import quickly_made
 from contextdb.motion.selection.decision import Action, Decision, Playing
 
-IS_AHEAD, LOST = 10, 12
-"""Where a `cdbo_given` of the core's pose.h has whether what is entered has moved the body already, and the seam."""
+COLUMNS = pose_columns()
+"""Where each single number of a row is."""
+PLAY_RATE = COLUMNS["play_rate"]
+N_GIVEN, N_SEAM, IS_AHEAD, LOST = 16, 4, 10, 12
+"""So many numbers the core is given of a character and of a moment at a seam, see `cdbo_given` in pose.h; and where it has whether
+what is entered has moved the body already, and the seam."""
+N_MADE = N_GIVEN + 2 * N_SEAM
 
 
 @quickly_made
@@ -51,8 +61,6 @@ class Pose:
     play_rate: float
 
 
-@quickly_made
-@dataclass(frozen=True, eq=False, slots=True)
 class CrowdPoses(Made[Pose]):
     """The poses of N characters: a sequence, whose poses are made when they are requested, with their arrays as views.
 
@@ -60,27 +68,57 @@ class CrowdPoses(Made[Pose]):
     ----------
     decisions : sequence of N Decision
         What they are poses of.
-    given : float64 array
-        What happened to each, as the core has it; see `cdbo_given` in pose.h.
     roots : float64 array, shape (N, 3)
         x, z and heading of each.
-    rotations : float64 array, shape (N, J, 4)
-    translations, positions : float64 array, shape (N, J, 3)
     contacts : bool array, shape (N, n feet)
-    play_rates : float64 array, shape (N,)
     """
 
-    decisions: Sequence[Decision]
-    given: Floats
-    roots: Floats
-    rotations: Floats
-    translations: Floats
-    positions: Floats
-    contacts: Flags
-    play_rates: Floats
+    def __init__(
+        self, decisions: Sequence[Decision], roots: Floats, contacts: Flags, rows: Floats, made: Floats, n_joints: int
+    ) -> None:
+        self.decisions, self.roots, self.contacts = decisions, roots, contacts
+        self._rows, self._made, self._n_joints = rows, made, n_joints
 
     def __len__(self) -> int:
         return len(self.decisions)
+
+    @cached_property
+    def _parts(self) -> list[Floats]:
+        """What the core made, one array after the other."""
+        n, n_joints = len(self), self._n_joints
+        shapes = (n, N_GIVEN), (2 * n, N_SEAM), (n, n_joints, 4), (n, n_joints, 3), (n, n_joints, 3)
+        ends = np.cumsum([math.prod(shape) for shape in shapes])[:-1]
+        return [part.reshape(shape) for part, shape in zip(np.split(self._made, ends), shapes, strict=True)]
+
+    @property
+    def given(self) -> Floats:
+        """What happened to each, as the core has it, see `cdbo_given` in pose.h: float64 [N, 16]."""
+        return self._parts[0]
+
+    @property
+    def seams(self) -> Floats:
+        """The moments at seams, two for each character that has one: float64 [2 N, 4]."""
+        return self._parts[1]
+
+    @property
+    def rotations(self) -> Floats:
+        """Each joint against its parent: float64 [N, J, 4]."""
+        return self._parts[2]
+
+    @property
+    def translations(self) -> Floats:
+        """Likewise, in metres: float64 [N, J, 3]."""
+        return self._parts[3]
+
+    @property
+    def positions(self) -> Floats:
+        """Each joint in the world: float64 [N, J, 3]."""
+        return self._parts[4]
+
+    @property
+    def play_rates(self) -> Floats:
+        """Seconds of the clip that pass in a second of play: float64 [N]."""
+        return self._rows[:, PLAY_RATE]
 
     def _at(self, i: int) -> Pose:
         decision, (x, z, heading) = self.decisions[i], self.roots[i].tolist()

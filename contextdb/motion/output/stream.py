@@ -19,8 +19,8 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.steering import Steered
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.ground import A_GROUND, Ground
-from contextdb.motion.output.pipeline import COLUMNS, Pipeline, Rows
-from contextdb.motion.output.pose import CrowdPoses, Pose
+from contextdb.motion.output.pipeline import Pipeline, Rows
+from contextdb.motion.output.pose import COLUMNS, CrowdPoses, Pose
 from contextdb.motion.output.samples import Flags
 from contextdb.motion.output.settings import PoseSettings, RootMode
 from contextdb.motion.selection.controller import Decided
@@ -108,6 +108,10 @@ class PoseStream:
         require_kind(other, PoseStream, "other", "a PoseStream")
         return self._pipeline.is_like(other._pipeline)
 
+    def kind(self) -> int:
+        """A number that only streams have which are like it."""
+        return id(self._pipeline)
+
     @property
     def state(self) -> PoseState:
         """Where the stream is, to come back to with `restore`."""
@@ -189,22 +193,21 @@ class PoseStream:
         if ground is not None and not callable(ground):
             raise ContextError(Fault(f"ground is {ground!r}.", A_GROUND))
         place = checked_place(body, root_of(decision, self.settings))
-        grounds = None if ground is None else [ground]
+        grounds = None if ground is None else (ground,)
         rows, own = self._rows.row(self._at), self._pipeline
         places, plays = None if place is None else np.array([place]), own.plays_of(rows, [decision], grounds)
-        rows, poses = own.update(rows, [decision], plays, dt, places, grounds)
+        rows, poses, _ = own.update(rows, [decision], plays, dt, places, grounds)
         self._go_on(rows, 0)
         return poses[0]
 
     def posed(self, decided: Decided, dt: float, places: Floats, ground: Ground | None) -> tuple[CrowdPoses, Flags]:
         """The same unchecked, of one, with the place of its body [1, 3], whose `Pose` is made when it is requested; and whether the
         clip alone moves the body [1]."""
-        grounds, (((_, updates),), decisions) = None if ground is None else [ground], (decided.updates, decided.decisions)
-        rows, own = self._rows.row(self._at), self._pipeline
-        plays = own.plays_in(rows, updates, decisions, grounds)
-        rows, poses = own.update(rows, decisions, plays, dt, places, grounds)
+        rows, ((_, updates),) = self._rows if len(self._rows.last) == 1 else self._rows.row(self._at), decided.updates
+        grounds = None if ground is None else (ground,)
+        rows, poses, moves_body = self._pipeline.decided(rows, updates, decided.decisions, dt, places, grounds)
         self._go_on(rows, 0)
-        return poses, own.moves_body(plays)
+        return poses, moves_body
 
 
 def root_of(decision: Decision, settings: PoseSettings) -> RootMode:

@@ -47,11 +47,18 @@ class PoseStreams(ListSequence[PoseStream]):
         self._items = require_many_of(streams, PoseStream, "streams", "a list of PoseStream")
         if not self._items:
             raise MotionError(Fault("there is no stream.", "at least one"))
-        if len(set(map(id, self._items))) < len(self._items):
-            raise MotionError(Fault("the same stream is there twice.", "one of its own for each, such as copy.copy(stream)"))
+        _check_each_once(self._items)
         self._pipeline = self._items[0]._pipeline
         if not all(stream.is_like(self._items[0]) for stream in self._items):
             raise MotionError(Fault("the streams have different banks or settings.", "streams of the same banks and settings"))
+
+    @classmethod
+    def of_like(cls, streams: list[PoseStream]) -> PoseStreams:
+        """Those of streams that are known to be like each other. Raises MotionError for the same one twice."""
+        _check_each_once(streams)
+        own = cls.__new__(cls)
+        own._items, own._pipeline = streams, streams[0]._pipeline
+        return own
 
     def __repr__(self) -> str:
         return f"<PoseStreams: {plural(len(self), 'character')}>"
@@ -102,19 +109,16 @@ class PoseStreams(ListSequence[PoseStream]):
         if len(decided) != len(self):
             raise ContextError(Fault(f"{plural(len(decided), 'decision')} for {plural(len(self), 'character')}.", "one for each"))
         places, grounds, rows = self._places(bodies, decided), self._grounds(ground), self._rows()
-        rows, poses = self._pipeline.update(rows, decided, self._pipeline.plays_of(rows, decided, grounds), dt, places, grounds)
+        rows, poses, _ = self._pipeline.update(rows, decided, self._pipeline.plays_of(rows, decided, grounds), dt, places, grounds)
         self.go_on(rows)
         return poses
 
     def updated(
         self, updates: Updates, decisions: list[Decision], dt: float, places: Floats, grounds: Grounds | None
-    ) -> tuple[CrowdPoses, Rows, Flags]:
+    ) -> tuple[Rows, CrowdPoses, Flags]:
         """The poses after the decisions of some updates, unchecked; the streams stand where they stood until `go_on` is given the
         rows. And whether the clip alone moves the body of each."""
-        rows, own = self._rows(), self._pipeline
-        plays = own.plays_in(rows, updates, decisions, grounds)
-        after, poses = own.update(rows, decisions, plays, dt, places, grounds)
-        return poses, after, own.moves_body(plays)
+        return self._pipeline.decided(self._rows(), updates, decisions, dt, places, grounds)
 
     def go_on(self, rows: Rows) -> None:
         """Go on from some rows, one for each."""
@@ -123,10 +127,10 @@ class PoseStreams(ListSequence[PoseStream]):
 
     def _rows(self) -> Rows:
         """The rows of all: as the last update left them, unless a stream was elsewhere meanwhile."""
-        each = [stream._place for stream in self._items]
-        first = each[0][0]
-        if len(first) == len(each) and all(rows is first and at == i for i, (rows, at) in enumerate(each)):
+        first = self._items[0]._place[0]
+        if len(first) == len(self) and all(stream._rows is first and stream._at == i for i, stream in enumerate(self._items)):
             return first
+        each = [stream._place for stream in self._items]
         numbers, displayed = (np.array([getattr(rows, name)[at] for rows, at in each]) for name in ("numbers", "displayed"))
         return Rows(numbers, displayed, [rows.last[at] for rows, at in each])
 
@@ -145,7 +149,7 @@ class PoseStreams(ListSequence[PoseStream]):
             and bodies.dtype == np.float64
             and np.isfinite(bodies).all()
         ):
-            return bodies
+            return np.ascontiguousarray(bodies)
         places = []
         for i, body in enumerate(bodies):
             try:
@@ -162,4 +166,9 @@ class PoseStreams(ListSequence[PoseStream]):
         for i, each in enumerate(ground):
             if each is not None and not callable(each):
                 raise ContextError(Fault(f"the ground is {each!r}.", "a function, or None", place=Place(f"character {i}")))
-        return ground if any(each is not None for each in ground) else None
+        return tuple(ground) if any(each is not None for each in ground) else None
+
+
+def _check_each_once(streams: list[PoseStream]) -> None:
+    if len(set(map(id, streams))) < len(streams):
+        raise MotionError(Fault("the same stream is there twice.", "one of its own for each, such as copy.copy(stream)"))

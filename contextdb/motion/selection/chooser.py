@@ -94,6 +94,9 @@ class Plays(NamedTuple):
         return None if row < 0 else RowPlay.of(self.rows[row].tolist())
 
 
+NO_PLAYS = None, None
+
+
 class Ranges(NamedTuple):
     """Which ranges may play in each of n updates, bool [n or 1, R], their biases, float64 [n or 1, R], and how they play; None
     where no row says."""
@@ -149,23 +152,16 @@ class Updates(NamedTuple):
 
     def run(self, parts: int) -> None:
         """Do some steps of the updates, on as many cores as this process may use."""
-        given, n, done = self.given, len(self.before), list[bool]()
-        what = (
-            given.ranges,
-            given.range_biases,
-            *given.shared[:5],
-            given.among,
-            given.urgent,
-            *(given.plays or (None, None)),
-            given.wide,
-            given.to_event,
-            given.event_s,
-        )
-        arrays = (self.before, self.moved, given.queries, given.dt_s, *what, self.after, self.decisions, self.found)
+        given, n, core, done = self.given, len(self.before), self.chooser.core, list[bool]()
+        arrays = (
+            self.before, self.moved, given.queries, given.dt_s, given.ranges, given.range_biases, *given.shared[:5],
+            given.among, given.urgent, *(given.plays or NO_PLAYS), given.wide, given.to_event, given.event_s,
+            self.after, self.decisions, self.found,
+        )  # fmt: skip
         if n < 2 * THREAD_QUERIES:
-            done.append(self.chooser.core.update(parts, 0, n, *arrays))
+            done.append(core.update(parts, 0, n, *arrays))
         else:
-            in_blocks(n, lambda start, stop: done.append(self.chooser.core.update(parts, start, stop, *arrays)))
+            in_blocks(n, lambda start, stop: done.append(core.update(parts, start, stop, *arrays)))
         if not all(done):
             for query in given.queries:
                 for database in self.chooser.selector.databases.values():
@@ -415,6 +411,11 @@ class Chooser:
                 self._shared[tags] = known  # type: ignore[index]
         return known
 
+    @cached_property
+    def nothing_more(self) -> tuple[Shared, Flags]:
+        """What characters may choose from where they are asked with nothing but `valid`, and the databases of the moment."""
+        return self.shared(None, None), self.among(None)
+
     def among(self, among: Among | None) -> Flags:
         """The databases of the moment: bool [1, D]."""
         if among is None:
@@ -458,7 +459,7 @@ class Chooser:
         """Which ranges may play in each of n updates."""
         if valid is None:
             return self._all_ranges
-        key = _answered_key(valid)
+        key = _answered_key(valid, self.has_mirrored)
         if key is None:
             return self._ranges_of(valid, n)
         if (known := self._answers.get(key)) is None:
@@ -470,10 +471,11 @@ class Chooser:
     def _ranges_of(self, valid: OfValidForMany, n: int) -> Ranges:
         if are_mappings(valid):
             return Ranges.joined([self.ranges(own, 1) for own in cast("Sequence[Any]", valid)])
-        if not isinstance(valid, Mapping) and (answers := AnswersOfMany.of(valid, n)) is not None:
+        if not isinstance(valid, Mapping) and (answers := AnswersOfMany.of(valid, n, self.has_mirrored)) is not None:
             return self._answered({None: answers}, n)
         of_databases = valid if isinstance(valid, Mapping) else dict.fromkeys(self.selector.databases, valid)
-        answers_of = {name: AnswersOfMany.of(each, n) for name, each in of_databases.items() if name in self.selector.databases}
+        given = [(name, each) for name, each in of_databases.items() if name in self.selector.databases]
+        answers_of = {name: AnswersOfMany.of(each, n, self.has_mirrored) for name, each in given}
         answered = self._answered({name: each for name, each in answers_of.items() if each is not None}, n)
         others = [name for name, each in answers_of.items() if each is None]
         return self._with_flags(answered, of_databases, others, n) if others else answered
@@ -527,6 +529,11 @@ class Chooser:
         return biases
 
     @cached_property
+    def has_mirrored(self) -> bool:
+        """Whether a range plays its asset mirrored; else no answer with mirrored facts counts."""
+        return any(bool(database.mirrored.any()) for _, database in self._loaded())
+
+    @cached_property
     def _all_ranges(self) -> Ranges:
         """All ranges, and their biases where nothing else is given: [1, R] each."""
         biases = [database.filter().range_biases for _, database in self._loaded()]
@@ -564,27 +571,27 @@ class AnswersOfMany(NamedTuple):
     plays: Floats | None
 
     @classmethod
-    def of(cls, valid: object, n: int) -> AnswersOfMany | None:
-        """What is given as valid; None where it is no answers of one table."""
+    def of(cls, valid: object, n: int, has_mirrored: bool) -> AnswersOfMany | None:
+        """What is given as valid; None where it is no answers of one table. Where no range is mirrored, nothing is asked for it."""
         if is_answer(valid):
             if valid.has_penalties:
-                return cls._of([valid])
-            mask, mirrored = valid.mask[None], valid.mirrored
+                return cls._of([valid], has_mirrored)
+            mask, mirrored = valid.mask[None], valid.mirrored if has_mirrored else valid
             return cls(valid.table_assets, (mask, mask if mirrored is valid else mirrored.mask[None]), None, valid.plays)
         if are_answers(valid):
             if len(valid) != n:
                 raise QueryError(Fault(f"{plural(len(valid), 'mask')} for {n} queries.", "one for all, or one for each query"))
             if not n or valid[0].has_penalties:
-                return cls._of([valid[i] for i in range(n)]) if n else None
-            return cls(valid.table_assets, (valid.mask, valid.mirrored.mask), None, valid[0].plays)
+                return cls._of([valid[i] for i in range(n)], has_mirrored) if n else None
+            return cls(valid.table_assets, (valid.mask, valid.mirrored.mask if has_mirrored else valid.mask), None, valid[0].plays)
         if isinstance(valid, (list, tuple)) and len(valid) == n and n and all(map(is_answer, valid)):
             assets = valid[0].table_assets
-            return cls._of(valid) if all(each.table_assets is assets for each in valid) else None
+            return cls._of(valid, has_mirrored) if all(each.table_assets is assets for each in valid) else None
         return None
 
     @classmethod
-    def _of(cls, answers: Sequence[Any]) -> AnswersOfMany:
-        mirrored = [each.mirrored for each in answers]
+    def _of(cls, answers: Sequence[Any], has_mirrored: bool) -> AnswersOfMany:
+        mirrored = [each.mirrored for each in answers] if has_mirrored else answers
         sides = (answers, mirrored)
         masks = [np.ascontiguousarray([each.mask for each in side]) for side in sides]
         has_costs = any(each.has_penalties for each in answers)
@@ -600,14 +607,14 @@ class AnswersOfMany(NamedTuple):
         return masks, costs
 
 
-def _answered_key(valid: Any) -> tuple[object, ...] | None:
+def _answered_key(valid: Any, has_mirrored: bool) -> tuple[object, ...] | None:
     """What tells one answer without costs, or those of some databases, from all others while it is kept; None for anything else."""
     if isinstance(valid, dict):
-        keys = [(name, _answered_key(each)) for name, each in valid.items()]
+        keys = [(name, _answered_key(each, has_mirrored)) for name, each in valid.items()]
         return None if any(key is None for _, key in keys) else tuple(keys)
     if not hasattr(valid, "bits") or valid.has_penalties:
         return None
-    return id(valid.table_assets), valid.bits, valid.mirrored.bits
+    return id(valid.table_assets), valid.bits, valid.mirrored.bits if has_mirrored else None
 
 
 def widens(valid: object) -> bool:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,9 +61,8 @@ FORCE, INTERRUPT = 1, 2
 @quickly_made
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """What n controllers are asked with beside their queries: one for each, and `valid` as for many."""
+    """What n controllers are asked with beside their queries and what is valid: one for each."""
 
-    valid: OfValidForMany | None
     tags: Sequence[OfTags | None]
     bias: Sequence[Mapping[str, ArrayLike] | None]
     among: Sequence[Among | None]
@@ -74,7 +74,6 @@ class Asked:
     @classmethod
     def of_one(
         cls,
-        valid: OfValid | None = None,
         tags: OfTags | None = None,
         bias: Mapping[str, ArrayLike] | None = None,
         penalties: OfPenalties | None = None,
@@ -84,17 +83,26 @@ class Asked:
         event: Event | None = None,
     ) -> Asked:
         """What one is asked with."""
-        return cls(valid, [tags], [bias], [among], [penalties], [force], [interrupt], [event])
+        return cls([tags], [bias], [among], [penalties], [force], [interrupt], [event])
 
     @property
     def is_plain(self) -> bool:
-        """Whether nothing but `valid` is given."""
-        given = self.tags, self.bias, self.among, self.penalties, self.event
-        return not (any(self.force) or any(self.interrupt) or any(one is not None for each in given for one in each))
+        """Whether nothing is given."""
+        if self is nothing_asked(len(self.tags)):
+            return True
+        given = *self.tags, *self.bias, *self.among, *self.penalties, *self.event
+        return not any(self.force) and not any(self.interrupt) and given.count(None) == len(given)
 
     def options(self, i: int) -> SearchOptions:
         """Those of one, checked."""
         return SearchOptions(None, self.tags[i], None, self.bias[i], self.among[i], None, self.penalties[i])
+
+
+@lru_cache
+def nothing_asked(n: int) -> Asked:
+    """What n are asked with where nothing is given."""
+    nothing, no = (None,) * n, (False,) * n
+    return Asked(nothing, nothing, nothing, nothing, no, no, nothing)
 
 
 class Decided(NamedTuple):
@@ -187,13 +195,17 @@ class Controller:
     @property
     def _row(self) -> Floats:
         """The controller's row: [1, W]."""
-        return self._rows[self._at : self._at + 1]
+        return self._rows if len(self._rows) == 1 else self._rows[self._at : self._at + 1]
+
+    @property
+    def stand(self) -> tuple[Chooser, Floats]:
+        """What the core knows of the selector and the settings, and where the controller is there: [1, W], not to be changed."""
+        return self.chooser, self._row
 
     @property
     def row(self) -> Floats:
-        """Where the controller is, as the core has it: [1, W], not to be changed."""
-        self.chooser  # noqa: B018  (the selector may have been exchanged)
-        return self._row
+        """Where the controller is."""
+        return self.stand[1]
 
     @property
     def _state(self) -> ControllerState:
@@ -286,8 +298,8 @@ class Controller:
             `body` is none.
         """
         wanted = self._checked(query)
-        asked = Asked.of_one(valid, tags, bias, penalties, among, force, interrupt, event)
-        return update_all([self], seconds_of(dt_s), wanted[None], asked, [context], [place_of(body)]).decisions[0]
+        asked = Asked.of_one(tags, bias, penalties, among, force, interrupt, event)
+        return update_all([self], seconds_of(dt_s), wanted[None], valid, asked, [context], [place_of(body)]).decisions[0]
 
     def _checked(self, query: ArrayLike) -> Floats:
         """The query as float64 [F], checked as long as any database is there to say how long it must be."""
@@ -336,6 +348,7 @@ def update_all(
     controllers: Sequence[Controller],
     dt_s: float,
     queries: Floats,
+    valid: OfValidForMany | None,
     asked: Asked,
     contexts: Sequence[Mapping[str, object] | None],
     bodies: Sequence[GroundPlace | None] | Floats,
@@ -346,10 +359,12 @@ def update_all(
     decisions: list[Any] = [None] * len(controllers)
     made = []
     for numbers in _together(controllers, asked):
-        is_all = len(numbers) == len(controllers)
-        own = controllers if is_all else [controllers[i] for i in numbers]
-        parts = (queries, moved) if is_all else (queries[numbers], None if moved is None else moved[numbers])
-        updates = prepared(own, dt_s, parts[0], asked, numbers, parts[1])
+        own, parts = controllers, (queries, valid, moved)
+        if len(numbers) < len(controllers):
+            own = [controllers[i] for i in numbers]
+            among = valid if valid is None else [own_valid(valid, i) for i in numbers]
+            parts = queries[numbers], among, None if moved is None else moved[numbers]
+        updates = prepared(own, dt_s, *parts, asked, numbers)
         search_us = _run(updates, own)
         made.append((numbers, updates))
         question = Question(queries, contexts, bodies, asked.force, asked.interrupt, asked.event, search_us)
@@ -366,6 +381,10 @@ def _together(controllers: Sequence[Controller], asked: Asked) -> list[list[int]
     if len(controllers) == 1:
         return [[0]]
     groups: dict[object, list[int]] = {}
+    if asked.is_plain:
+        for i, one in enumerate(controllers):
+            groups.setdefault(id(one.chooser), []).append(i)
+        return list(groups.values())
     each = zip(controllers, asked.tags, asked.bias, asked.event, strict=True)
     for i, (one, tags, bias, event) in enumerate(each):
         key = id(one.chooser), tags if isinstance(tags, TagFilter) else id(tags), id(bias), -1 if event is None else i
@@ -374,22 +393,28 @@ def _together(controllers: Sequence[Controller], asked: Asked) -> list[list[int]
 
 
 def prepared(
-    own: Sequence[Controller], dt_s: float, queries: Floats, asked: Asked, numbers: Sequence[int], moved: Floats | None = None
+    own: Sequence[Controller],
+    dt_s: float,
+    queries: Floats,
+    valid: Any,
+    moved: Floats | None,
+    asked: Asked,
+    numbers: Sequence[int],
 ) -> Updates:
-    """The updates of controllers that go together, whose numbers among all are these, before their first step; with what has
-    `moved` where that is known."""
-    chooser, n, rows, is_plain = own[0].chooser, len(own), rows_of(own), asked.is_plain
+    """The updates of controllers that go together, whose numbers among all are these, before their first step; with what is valid
+    for them, and what has `moved` where that is known."""
+    chooser, n, rows = own[0].chooser, len(own), rows_of(own)
     if moved is None:
         moved = chooser.move(rows, dt_s)[0]
-    valid: Any = asked.valid
-    if valid is not None and n < len(asked.tags):
-        valid = [own_valid(valid, i) for i in numbers]
-    chooser.check_names(NOTHING_MORE if is_plain else asked.options(numbers[0]), valid)
+    is_plain, is_answered = asked.is_plain, hasattr(valid, "table_assets")
+    if not (is_plain and is_answered):
+        chooser.check_names(NOTHING_MORE if is_plain else asked.options(numbers[0]), valid)
     flags, biases, plays = chooser.ranges(valid, n)
-    wide = _wide(chooser, moved, flags, valid, asked, numbers) if widens(valid) else None
-    wanted = np.ascontiguousarray(queries[:, : chooser.n_features])
-    shared, among, urgent = chooser.shared(None, None), chooser.among(None), np.zeros(n, np.uint8)
-    given = Given(wanted, dt_s, flags, biases, shared, among, urgent, wide, plays)
+    is_widening = valid.is_widening if is_answered else widens(valid)
+    wide = _wide(chooser, moved, flags, valid, asked, numbers) if is_widening else None
+    if queries.shape[1] != chooser.n_features or not queries.flags.c_contiguous:
+        queries = np.ascontiguousarray(queries[:, : chooser.n_features])
+    given = Given(queries, dt_s, flags, biases, *chooser.nothing_more, np.zeros(n, np.uint8), wide, plays)
     if not is_plain:
         given = _with_more(given, chooser, moved, asked, numbers)
     found = np.empty((n, len(chooser.names), 3))
@@ -432,6 +457,8 @@ def _run(updates: Updates, own: Sequence[Controller]) -> float:
 
 def rows_of(controllers: Sequence[Controller]) -> Floats:
     """The rows of controllers of one selector and settings: [Q, W]."""
+    if len(controllers) == 1:
+        return controllers[0]._row
     first = controllers[0]._rows
     if len(first) == len(controllers) and all(each._rows is first and each._at == i for i, each in enumerate(controllers)):
         return first

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.records import collector_at_rest
 from contextdb.motion.selection.chooser import are_mappings
-from contextdb.motion.selection.controller import Asked, Controller, Decided, rows_of, seconds_of, update_all
+from contextdb.motion.selection.controller import Asked, Controller, Decided, nothing_asked, rows_of, seconds_of, update_all
 from contextdb.motion.selection.controller_state import ControllerState
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.selection.events import Event
@@ -160,7 +161,6 @@ class ControllerGroup(ListSequence[Controller]):
         if arguments.is_one_for_each(valid) or are_mappings(valid):
             each_of(valid, n, "mask", is_one=False)
         asked = Asked(
-            valid,
             _each(tags, n, "tag filter"),
             _each(bias, n, "bias"),
             _each_among(among, n),
@@ -178,7 +178,7 @@ class ControllerGroup(ListSequence[Controller]):
             seconds = seconds_of(dt_s)
         if any(each is not None for each in (tags, bias, among, penalties, event)):
             self._check(asked)
-        return update_all(self, seconds, wanted, asked, facts, places).decisions
+        return update_all(self, seconds, wanted, valid, asked, facts, places).decisions
 
     def decided(
         self,
@@ -191,11 +191,11 @@ class ControllerGroup(ListSequence[Controller]):
         moved: Floats,
     ) -> Decided:
         """The same where all but `event` is known to be right, with the places of bodies [Q, 3] and what has moved [Q, 16]."""
-        nothing, no, events = [None] * len(self), [False] * len(self), _each_event(event, len(self))
-        asked = Asked(valid, nothing, nothing, nothing, nothing, no, no, events)
+        asked = nothing_asked(len(self))
         if event is not None:
+            asked = replace(asked, event=_each_event(event, len(self)))
             self._check(asked)
-        return update_all(self, dt_s, queries, asked, contexts, places, moved)
+        return update_all(self, dt_s, queries, valid, asked, contexts, places, moved)
 
     def _check(self, asked: Asked) -> None:
         """Refuse what a controller cannot be asked with, with its number."""

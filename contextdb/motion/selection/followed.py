@@ -34,7 +34,7 @@ def follow(
         raise ContextError(NO_PACKET)
     enters, (d, at, frame) = bool(followed[ENTERS]), (int(number) for number in followed[:3].tolist())
     asked = Asked.of_one(force=enters)
-    updates = prepared([controller], dt_s, query[None], asked, [0])
+    updates = prepared([controller], dt_s, query[None], None, None, asked, [0])
     updates.found[:] = NOT_SEARCHED
     row = updates.decisions[0]
     if enters:

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from contextdb.authoring.clip_looks import ClipAt, LeftOut, Looks, Seen
-from contextdb.authoring.saved_looks import SavedLooks, look_at_all
+from contextdb.authoring.clip_looks import ClipAt, LeftOut, Looks, SavedLooks, Seen, look_at_all
 from contextdb.disk import path_in_quotes
 from contextdb.disk.boundary import inside
 from contextdb.disk.engines import Engines, here

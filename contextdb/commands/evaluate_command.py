@@ -26,7 +26,7 @@ import polars as pl
 from contextdb.bitmask import Rows
 from contextdb.cells.facts import UNKNOWN_MODES
 from contextdb.commands import missing_facts_by_option
-from contextdb.commands.coverage_telemetry import ENGINES
+from contextdb.commands.coverage_command import ENGINES
 from contextdb.commands.progress import bar, has_many_bytes
 from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, aligned, output, printable, styled, wants_colour

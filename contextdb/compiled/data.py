@@ -30,13 +30,12 @@ from contextdb.cells.mirroring import changed_in_mirror, frozen_facts, in_mirror
 from contextdb.cells.notebook import one_line
 from contextdb.cells.sets import ANY, Cell
 from contextdb.columns import TextColumn
-from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks
+from contextdb.compiled.classes import ColumnMasks, NumberCells, NumberMasks, WideMasks, number_cells
 from contextdb.compiled.codes import CodeSlots
 from contextdb.compiled.core_table import UNKNOWN, core_table
 from contextdb.compiled.layers import SoftMasks, bits_of, nbytes
 from contextdb.compiled.matches import Answering, Matches, with_mirrored, with_penalties, with_widened
 from contextdb.compiled.memory import Memory
-from contextdb.compiled.number_cells import NumberCells, number_cells
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
 from contextdb.compiled.pick_columns import NOTHING, PickColumns
 from contextdb.compiled.unchanging import Unchanging

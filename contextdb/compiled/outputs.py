@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from contextdb.bitmask import Rows, read_only
 from contextdb.cells.arguments import require_row, require_text
 from contextdb.cells.output_types import OutputValue
-from contextdb.cells.outputs import Output
-from contextdb.cells.row_play import N_PLAY, read_play
+from contextdb.cells.outputs import N_PLAY, Output, read_play
 from contextdb.columns import TextColumn
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.errors import ContextError, Fault, NoSuchOutput, NoSuchPlace, no_such, safe_text, some
@@ -115,7 +114,7 @@ class Outputs(Unchanging, Mapping[str, Column]):
 
     @cached_property
     def plays(self) -> NDArray[np.float64] | None:
-        """How each row plays, and last what plays without a row: float64 [R + 1, 8], see `contextdb.cells.row_play`; None where no
+        """How each row plays, and last what plays without a row: float64 [R + 1, 8], see `contextdb.cells.outputs`; None where no
         reserved output is declared."""
         reserved = [output for output in self.declared if output.is_reserved]
         if not reserved:

@@ -15,8 +15,7 @@ from contextdb.covering.assumed import Opened, opened
 from contextdb.covering.engine import SAMPLES, WORK, Covered, counted
 from contextdb.covering.gaps import described
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.covering.report import Gap
-from contextdb.covering.shares import distinct_percents, format_percent
+from contextdb.covering.report import Gap, distinct_percents, format_percent
 from contextdb.covering.space import Box
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
 from contextdb.errors import Fault, TableError, plural

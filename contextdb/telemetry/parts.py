@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from contextdb.compiled.data import CompiledData
 from contextdb.covering.factors import TagFactor
 from contextdb.errors import Fault, TableError
-from contextdb.telemetry.facts_read import MOST_EXAMPLES
-from contextdb.telemetry.fields import Fields
+from contextdb.telemetry.facts_read import MOST_EXAMPLES, Fields
 from contextdb.telemetry.keys import Counts, Hashes, begins
 
 MOST_OPEN = 1 << 13

@@ -58,7 +58,6 @@ class FolderClips:
 
     @property
     def clips(self) -> list[ClipHead]:
-        """The clips, without their motion."""
         return [seen.head for seen in self.seen]
 
     def facts(self) -> list[ClipFacts]:
@@ -80,7 +79,6 @@ class FolderClips:
 
     @property
     def paths(self) -> list[Path]:
-        """The file of each clip."""
         return [at.file for at in self.places]
 
 

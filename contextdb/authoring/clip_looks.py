@@ -59,7 +59,6 @@ class ClipAt:
         return clip_name(self.file, self.take)
 
     def source(self) -> ClipSource:
-        """The file, read."""
         return ClipSource.of(self.file)
 
     def clip(self, source: ClipSource) -> Clip:

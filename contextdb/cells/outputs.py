@@ -193,7 +193,6 @@ class Output:
         return clipped if self.type.has_size else int(clipped[0]) if self.type.is_whole else clipped[0]
 
     def _mend(self, text: str) -> str:
-        """The nearest text that reads, quoted for a message, or nothing."""
         if says_any(text) and not self.needs_cell:
             return _LEAVE_EMPTY
         short = text[:1000].strip()

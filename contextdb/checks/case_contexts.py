@@ -91,7 +91,6 @@ class _Search:
 
     @cached_property
     def _rows(self) -> NDArray[np.int64]:
-        """The row of each box of the space."""
         return np.array(self.ready.space.rows, np.int64)
 
     @cached_property

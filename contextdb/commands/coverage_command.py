@@ -314,7 +314,6 @@ def _only(tables: Sequence[EitherTable]) -> EitherTable:
 
 
 def _count(text: str) -> int:
-    """A whole number from 0 up."""
     plain = text.replace("_", "").replace(",", "")
     if not (plain.isascii() and plain.isdecimal()) or len(plain) > 15:
         raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a whole number from 0 up.")

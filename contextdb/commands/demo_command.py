@@ -349,7 +349,6 @@ def world(player: Character) -> tuple[str, str]:
 
 
 def _gait(stick: tuple[float, float]) -> str:
-    """What the game says for a stick."""
     speed = math.hypot(*stick)
     return "Idle" if speed == 0.0 else "Run" if speed >= RUNS_FROM_MPS else "Walk"
 

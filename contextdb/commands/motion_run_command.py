@@ -70,7 +70,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _pose_file(arguments: argparse.Namespace) -> Path | None:
-    """Where the poses go, if anywhere."""
     if arguments.poses is None:
         if arguments.capsules:
             raise ContextDBError(Fault("--capsules is about a file of poses.", "--poses FILE.glb with it"))
@@ -256,7 +255,6 @@ class Stick:
 
     @property
     def duration_s(self) -> float:
-        """Seconds from the first moment to the last."""
         return float(self.times_s[-1])
 
     def at(self, time_s: float) -> int:

@@ -61,7 +61,6 @@ class ValueMasks:
         return [bitmask.to_int(m) for m in self.masks]
 
     def codes(self, fact: Value | None) -> tuple[int, ...]:
-        """The number of the fact's mask; None is a missing fact."""
         if fact is None:
             return (len(self.masks) - 1,)
         return (self.class_of.get(fact, len(self.values)),)
@@ -90,15 +89,12 @@ class NumberMasks:
 
     @cached_property
     def ints(self) -> list[int]:
-        """Every mask as a Python integer, the missing one last."""
         return [bitmask.to_int(m) for m in self.masks]
 
     def codes(self, fact: float | None) -> tuple[int, ...]:
-        """The number of the fact's mask; None is a missing fact."""
         return (len(self.masks) - 1 if fact is None else bisect_right(self.bound_list, fact),)
 
     def set_bits(self, accepts: sets.Accepted) -> tuple[int, int]:
-        """Rows that accept some, and rows that accept all, of a set of numbers."""
         assert isinstance(accepts, sets.NumberSet)
         return _some_and_all(self.ints, _classes_in(accepts, self.bound_list))
 
@@ -123,7 +119,6 @@ class WideMasks:
 
     @cached_property
     def bound_list(self) -> list[float]:
-        """The bounds as Python floats, to bisect in."""
         return [float(b) for b in self.bounds]
 
     @cached_property
@@ -154,7 +149,6 @@ class WideMasks:
         return bits
 
     def set_bits(self, accepts: sets.Accepted) -> tuple[int, int]:
-        """Rows that accept some, and rows that accept all, of a set of numbers."""
         assert isinstance(accepts, sets.NumberSet)
         held = [self.bits(k) for k in _classes_in(accepts, self.bound_list)]
         return reduce(or_, held), reduce(and_, held)

@@ -285,7 +285,6 @@ class CompiledData(Unchanging):
 
     @cached_property
     def is_soft(self) -> bool:
-        """Whether the table has soft cells."""
         return any(self.soft)
 
     @cached_property
@@ -379,7 +378,6 @@ class CompiledData(Unchanging):
 
     @cached_property
     def codes(self) -> CodeSlots:
-        """Which codes the facts of a context have."""
         return CodeSlots(self.masks, self.enabled, self.n_rows)
 
     @cached_property
@@ -434,7 +432,6 @@ class CompiledData(Unchanging):
 
     @cached_property
     def core(self) -> Table:
-        """The table as the core has it."""
         columns = list(zip(self.conditions, self.masks, strict=True))
         core = core_table(columns, self.enabled, self.answering, self.derivation, self.when, self.soft)
         core.is_watched = self._watcher is not None

@@ -39,7 +39,6 @@ class Outputs(Unchanging, Mapping[str, Column]):
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The names of the outputs, in the order in which they are declared."""
         return tuple(output.name for output in self.declared)
 
     def __getitem__(self, name: str) -> Column:

@@ -63,7 +63,6 @@ def stubs_of(tables: Mapping[str, CompiledTable]) -> str:
 
 
 def _of_table(names: Names, table: CompiledTable, literals: Mapping[Condition, str]) -> Iterator[str]:
-    """All types of a table."""
     type_of = cache(lambda what: names.of(f"{table.name} {what}"))
     yield _facts(type_of("facts"), table, literals)
     roles, outputs = roles_of(table.asked), table.outputs.declared

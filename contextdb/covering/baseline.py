@@ -174,8 +174,10 @@ def compared(ready: Opened, report: CoverageReport, earlier: Earlier) -> Change:
     held_before = BoxSet.of(space.full, [*impossible, *(box for box in before_boxes if box is not None), *space.boxes])
     rows = BoxSet.of(space.full, [*impossible, *space.boxes])
     ids_now, ids_before = {gap.id for gap in report.gaps}, {gap.id for gap in earlier.gaps}
-    opened = (g for g, box in zip(report.gaps, now_boxes, strict=True) if g.id not in ids_before and not _is_in(box, held_before))
-    closed = (g for g, box in zip(earlier.gaps, before_boxes, strict=True) if g.id not in ids_now and _is_closed(box, rows))
+    opened = (
+        g for g, box in zip(report.gaps, now_boxes, strict=True) if g.id not in ids_before and not _is_held(box, held_before, False)
+    )
+    closed = (g for g, box in zip(earlier.gaps, before_boxes, strict=True) if g.id not in ids_now and _is_held(box, rows, True))
     listed = (
         *zip((g.id for g in report.gaps), now_boxes, strict=True),
         *zip((g.id for g in earlier.gaps), before_boxes, strict=True),
@@ -212,20 +214,12 @@ def _reads(cells: Mapping[str, str], domains: Mapping[str, Domain]) -> bool:
         return False
 
 
-def _is_in(box: Box | None, others: BoxSet) -> bool:
-    """Whether some boxes hold a whole box; "no" where that cannot be reported."""
+def _is_held(box: Box | None, boxes: BoxSet, otherwise: bool) -> bool:
+    """Whether some boxes hold a whole box; `otherwise` where the table cannot say it any more, or the search is too long."""
     try:
-        return box is not None and others.outside(others.all, box, Steps(STEPS)) is None
+        return otherwise if box is None else boxes.outside(boxes.all, box, Steps(STEPS)) is None
     except OutOfSteps:
-        return False
-
-
-def _is_closed(box: Box | None, rows: BoxSet) -> bool:
-    """Whether every context of an earlier gap has a valid row now, or can happen no more; one that the table cannot say is gone."""
-    try:
-        return box is None or rows.outside(rows.all, box, Steps(STEPS)) is None
-    except OutOfSteps:
-        return True
+        return otherwise
 
 
 def _newly_dead(findings: Iterable[Finding], before: Counter[tuple[str, str]]) -> Iterable[Finding]:

@@ -215,7 +215,6 @@ class _Prover:
         return NumberedBoxes.of(self.space.full, outside)
 
     def _around(self, point: Point) -> Box:
-        """A box of counterexamples round one."""
         for part in self.demand.parts():
             within, avoided = part
             is_within = all(side >> k & 1 for side, k in zip(within, point, strict=True))

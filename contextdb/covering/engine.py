@@ -146,7 +146,7 @@ def counted(opened: Opened, seed: int, work: int, max_samples: int | None, max_g
     searching = watcher.within("Looking for gaps", GAPS_AT, SHARES_AT)
     gap_boxes = find_gaps(space, () if whole and space.is_fitting else counts.uncovered, 4 * max_gaps + 1, steps, searching)
     sizing = watcher.within("Measuring gaps", SHARES_AT, FINDINGS_AT)
-    measure = _measure(opened, possible, work, samples, seed)
+    measure = measure_of(opened, possible, work, samples, seed)
     gaps = described(space, compiled, gap_boxes.boxes, measure, max_gaps, sizing)
     if drawer is not None:
         gaps = [gap for gap in gaps if gap.share > 0.0]
@@ -203,7 +203,7 @@ def finding_steps(work: int, n_boxes: int) -> int:
     return search_steps(work, n_boxes) + min(n_boxes * (work // 1_000_000), 16 * work // max(1, n_boxes))
 
 
-def _measure(opened: Opened, possible: Bounds, work: int, samples: int, seed: int) -> Measure:
+def measure_of(opened: Opened, possible: Bounds, work: int, samples: int, seed: int) -> Measure:
     """What tells the share of a box: the counter, or samples where only they know what can happen."""
     if opened.drawer is not None:
         return SampledShares.of(Sampler(opened.space, drawer=opened.drawer), samples, np.random.default_rng(seed))

@@ -98,7 +98,6 @@ class Expectation:
         return sorted(items, key=lambda item: -item.share)
 
     def to_json(self) -> dict[str, object]:
-        """The coverage as plain data."""
         covered = self.covered
         return {
             "file": self.file,

@@ -58,7 +58,6 @@ class Moments:
             yield self.drawn(codes[i], columns, i)
 
     def drawn(self, codes: NDArray[np.int32], columns: Mapping[str, list[Any]], i: int) -> Moment:
-        """Number `i` of some draws."""
         assert self.drawer is not None
         domains = {name: condition.domain for name, condition in self.drawer.given.items()}
         given = {name: written_fact(_plain_value(column[i]), domains[name]) for name, column in columns.items()}

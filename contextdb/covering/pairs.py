@@ -143,7 +143,6 @@ class PairTable:
         return sum(s.is_named for s in slices) / len(slices) if slices else 1.0
 
     def pairs(self) -> Iterator[tuple[int, int]]:
-        """Every pair of two conditions, by number."""
         return ((i, j) for i in range(len(self.conditions)) for j in range(i + 1, len(self.conditions)))
 
     def to_json(self) -> dict[str, object]:

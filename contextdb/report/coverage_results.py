@@ -159,7 +159,6 @@ class CoverageResults:
 
     @property
     def passed(self) -> bool:
-        """Whether every threshold is met."""
         return all(gate.passed for gate in self.gates)
 
     @property

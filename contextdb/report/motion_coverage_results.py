@@ -134,7 +134,6 @@ class MotionCoverageResults:
 
     @property
     def passed(self) -> bool:
-        """Whether every threshold is met."""
         return all(gate.passed for gate in self.gates)
 
     @property

@@ -79,7 +79,6 @@ class ClipSource:
 
     @property
     def file(self) -> str:
-        """The file's name in messages."""
         return str(self.path)
 
     @cached_property
@@ -91,7 +90,6 @@ class ClipSource:
 
     @property
     def names(self) -> list[str]:
-        """The names of its clips."""
         return [clip_name(self.path, take) for take in self.takes or ("",)]
 
     def clip(self, take: str = "", name: str | None = None, *, metres_per_unit: Unit = CENTIMETRE, up: Up = "y") -> Clip:

@@ -59,7 +59,6 @@ class MadeClip:
 
     @property
     def name(self) -> str:
-        """The clip's name."""
         return self.clip.name
 
 

@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from contextdb.commands import add_page_arguments, take_page_arguments
+from contextdb.commands import add_page_arguments, answer, take_page_arguments
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_page import Played, comment_of, page_file, rerun_file, write_page, write_rerun
 from contextdb.commands.motion_stage import add_view
@@ -53,7 +53,6 @@ from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.views import NOTHING_FORCED, decision_lines, look_first, session_lines, summary_line
 from contextdb.motion.trace.what_if import what_if
 from contextdb.motion.trace.why_not import WhyNot
-from contextdb.report.render_json import as_json
 from contextdb.tables.project import SCHEMA_FILE, Project, folder_of
 
 Json = dict[str, object]
@@ -111,12 +110,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         parts.insert(0, _FullDecision.of(replay, place).part())
     if not parts:
         parts.append(_session(replay) if page is None else ({}, [summary_line(replay.trace.brief())]))
-    with output():
-        if arguments.json:
-            merged = {key: value for document, _ in parts for key, value in document.items()}
-            print(as_json({"format": 1, "file": arguments.file, **merged}), end="")
-        else:
-            print(*("\n".join(lines) for _, lines in parts), sep="\n\n")
+    merged = {"file": arguments.file} | {key: value for document, _ in parts for key, value in document.items()}
+    answer(arguments, lambda: merged, lambda: ["\n\n".join("\n".join(lines) for _, lines in parts)])
     return ExitCode.OK
 
 

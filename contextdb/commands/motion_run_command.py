@@ -29,11 +29,11 @@ from contextdb import motion
 from contextdb.authoring.game_link import link
 from contextdb.cells.facts import UNKNOWN_MODES, Unknown
 from contextdb.columns import TextColumn
-from contextdb.commands import missing_facts_by_option
+from contextdb.commands import answer, missing_facts_by_option
 from contextdb.commands.motion_stage import Stage, reach_s
 from contextdb.commands.numbers import number_of, rate_of, whole_type
 from contextdb.compiled.table import CompiledTable
-from contextdb.console import ExitCode, output, progress
+from contextdb.console import ExitCode, progress
 from contextdb.disk import path_in_quotes
 from contextdb.errors import ContextDBError, Fault, FileError, Place, TableError, in_quotes, mend_for, some
 from contextdb.files.texts import AnySource, read_texts
@@ -42,7 +42,6 @@ from contextdb.motion.characters.tables import Facts
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.storage.written_poses import pose_file
 from contextdb.motion.trace.views import summary_line
-from contextdb.report.render_json import as_json
 from contextdb.tables.table import leaf_assets
 from contextdb.telemetry.contexts import Contexts, read_contexts
 
@@ -101,11 +100,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         motion.write_poses(
             [pose for pose in poses if pose is not None], character.stream.rig, poses_out, rate, has_body=arguments.capsules
         )
-    with output():
-        if arguments.json:
-            print(as_json({"format": 1, "file": str(out), "updates": len(trace), "bytes": out.stat().st_size}), end="")
-        else:
-            print(summary_line(trace.brief()))
+    about = {"file": str(out), "updates": len(trace), "bytes": out.stat().st_size}
+    answer(arguments, lambda: about, lambda: [summary_line(trace.brief())])
     return ExitCode.OK if any(decision.playing is not None for decision in trace.brief()) else ExitCode.FOUND
 
 

@@ -28,8 +28,7 @@ from contextdb.errors import ContextDBError, Fault, FileError
 from contextdb.telemetry.characters import Characters, Played, characters_json, joined
 from contextdb.telemetry.chunks import Chunk, chunks_of
 from contextdb.telemetry.contexts import context_files
-from contextdb.telemetry.facts_read import FactColumn, read_facts
-from contextdb.telemetry.keys import Counts, grouped
+from contextdb.telemetry.facts_read import Counts, FactColumn, grouped, read_facts
 from contextdb.telemetry.observe_file import moments_of
 
 EMPTIED, FILLED, GAINS, LOSES = "emptied", "filled", "gains", "loses"

@@ -24,10 +24,9 @@ from contextdb.cells.words import format_number
 from contextdb.compiled.batch import encode_column
 from contextdb.compiled.classes import TagMasks
 from contextdb.compiled.data import CompiledData
-from contextdb.core import pack_codes, unpack_codes
+from contextdb.core import group_keys, hash_keys, pack_codes, unpack_codes
 from contextdb.covering.factors import TagFactor
 from contextdb.errors import ContextError, safe_text
-from contextdb.telemetry.keys import Field, KeyWords
 
 PLAIN_NUMBER = r"^[ \t]*[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?[ \t]*$"
 MOST_EXAMPLES = 5
@@ -310,3 +309,45 @@ def _classes_in(factors: Sequence[TagFactor], tags: frozenset[str] | None) -> li
 def _class_in(factor: TagFactor, tags: frozenset[str]) -> int:
     answer = sum(1 << i for i, tag in enumerate(factor.tags) if covers(tag, tags))
     return factor.answers.index(answer) if answer in factor.answers else len(factor.answers)
+
+
+# ---- contexts as keys: which are the same, how many there are, and a sample of them that can be summed over files. N
+# contexts, K words a key. The smallest hashes seen are a uniform sample of the distinct contexts that is the same in
+# whichever order files come; as long as it is not full it is all of them. Source: Bar-Yossef et al., "Counting distinct
+# elements in a data stream", RANDOM 2002 (the k-th smallest hash as an estimator)
+
+Field = tuple[int, int, int, int]
+"""Where a code is in a key: its word, its first bit, how many bits it has, and the code that is 0 there."""
+KeyWords = NDArray[np.uint64]
+"""uint64 [K, N]"""
+Hashes = NDArray[np.uint64]
+Counts = NDArray[np.int64]
+
+
+def hashes_of(words: KeyWords) -> Hashes:
+    """A 64-bit number for each key, the same on every machine."""
+    hashes = np.empty(words.shape[1], np.uint64)
+    hash_keys(words, hashes)
+    return hashes
+
+
+def grouped(words: KeyWords, moments: Counts) -> tuple[Hashes, NDArray[np.int32], Counts]:
+    """The distinct keys that have moments: their hashes, the first context of each, and the sum of their moments."""
+    hashes = hashes_of(words)
+    first, sums = np.empty(len(hashes), np.int32), np.empty(len(hashes), np.int64)
+    n = group_keys(words, hashes, moments, first, sums)
+    return hashes[first[:n]], first[:n], sums[:n]
+
+
+def begins(ordered: Hashes) -> NDArray[np.bool_]:
+    """Which of some ascending hashes differ from the one before."""
+    flags = np.ones(len(ordered), np.bool_)
+    flags[1:] = ordered[1:] != ordered[:-1]
+    return flags
+
+
+def estimated(hashes: Hashes, is_full: bool) -> int:
+    """How many distinct contexts there are, by the smallest of their hashes."""
+    if not is_full:
+        return len(hashes)
+    return round((len(hashes) - 1) / ((float(hashes[-1]) + 1.0) / 2.0**64))

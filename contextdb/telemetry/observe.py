@@ -34,7 +34,7 @@ from contextdb.disk.engines import ENGINES, Engine, with_dask
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, no_such
 from contextdb.tables.table import EitherTable
 from contextdb.telemetry.contexts import context_files
-from contextdb.telemetry.keys import estimated
+from contextdb.telemetry.facts_read import estimated
 from contextdb.telemetry.observe_file import observe_file
 from contextdb.telemetry.observed import BadFile, FactNote, Observed, SeenGap
 from contextdb.telemetry.parts import MOST_HASHES, MOST_OPEN, Part, Plan, added, nothing

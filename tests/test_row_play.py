@@ -8,7 +8,8 @@ import pytest
 from c_compilers import C, built, compiler_for, ran, sanitizers
 
 import contextdb as cdb
-from contextdb.cells.outputs import ACCEPTED, N_PLAY, Output, RowPlay
+from contextdb.cells.outputs import Output
+from contextdb.cells.row_play import ACCEPTED, N_PLAY, RowPlay
 from contextdb.compiled.c_header import c_header_of
 from contextdb.errors import CellError, SchemaError
 from contextdb.schema.settings import read_schema

@@ -19,7 +19,7 @@ from functools import partial
 from pathlib import Path
 
 from contextdb import report
-from contextdb.cells.outputs import RowPlay
+from contextdb.cells.row_play import RowPlay
 from contextdb.checks.cases import CaseBar, check_cases, read_cases
 from contextdb.checks.contracts import contract_findings, proofs_of, strayed
 from contextdb.checks.run import check, check_rows, unused_conditions

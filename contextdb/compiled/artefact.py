@@ -20,7 +20,7 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     outputs.CCC.values     output CCC, of bool, int, number: uint8 (0 or 1), int64, float64 [R + 1]; numbers: float64 [R + 1, size]
     outputs.CCC.codes      int32 [R + 1]         of enum and text: which of the texts
     outputs.CCC.texts      uint8                 JSON list; of an enum its values in their order, then "" for none
-    outputs.plays          float64 [R + 1, 8]    how rows play, see contextdb.cells.outputs; with a reserved output only
+    outputs.plays          float64 [R + 1, 8]    how rows play, see contextdb.cells.row_play; with a reserved output only
     when.codes             as CCC.codes and CCC.texts, for the column of rules, named in `about`
     when.texts
     CCC.soft.FIELD         the same for soft cells, and CCC.soft.penalties float64 [R]

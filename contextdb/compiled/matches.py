@@ -126,7 +126,7 @@ class Matches(Framed, Answer):
     @property
     def plays(self) -> NDArray[np.float64] | None:
         """How each row of the table plays, by its reserved outputs, and last what plays without a row: float64 [n_rows + 1, 8], see
-        `contextdb.cells.outputs`; None where the table has no such output."""
+        `contextdb.cells.row_play`; None where the table has no such output."""
         return self._table.outputs.plays
 
     def outputs(self, name: str) -> NDArray[Any]:

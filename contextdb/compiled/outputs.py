@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from contextdb.bitmask import Rows, read_only
 from contextdb.cells.arguments import require_row, require_text
 from contextdb.cells.output_types import OutputValue
-from contextdb.cells.outputs import N_PLAY, Output, read_play
+from contextdb.cells.outputs import Output
+from contextdb.cells.row_play import N_PLAY, read_play
 from contextdb.columns import TextColumn
 from contextdb.compiled.unchanging import Unchanging
 from contextdb.errors import ContextError, Fault, NoSuchOutput, NoSuchPlace, no_such, safe_text, some
@@ -39,6 +40,7 @@ class Outputs(Unchanging, Mapping[str, Column]):
 
     @cached_property
     def names(self) -> tuple[str, ...]:
+        """The names of the outputs, in the order in which they are declared."""
         return tuple(output.name for output in self.declared)
 
     def __getitem__(self, name: str) -> Column:

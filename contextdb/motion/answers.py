@@ -36,7 +36,7 @@ class Answer(Protocol):
 
     @property
     def plays(self) -> NDArray[np.float64] | None:
-        """How each row plays, then what plays without one: float64 [R + 1, 8], see `contextdb.cells.outputs`; None where no row
+        """How each row plays, then what plays without one: float64 [R + 1, 8], see `contextdb.cells.row_play`; None where no row
         says. One object for all answers of a table."""
 
     @property

@@ -17,8 +17,8 @@ from dataclasses import replace
 from typing import Any
 
 from contextdb.cells.output_types import MOST_NUMBERS, OUTPUT_TYPES, OutputValue, names_where
-from contextdb.cells.outputs import KINDS as PLAY_KINDS
 from contextdb.cells.outputs import SLOT_COLUMNS, Output
+from contextdb.cells.row_play import KINDS as PLAY_KINDS
 from contextdb.errors import Fault, in_quotes, mend_for, nearest, some
 from contextdb.files.settings import Setting, Settings
 from contextdb.files.toml_shapes import Shape, between, dotted, key_value, near_key, no_key, nothing, one_of, what, wrong_name

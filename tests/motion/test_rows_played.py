@@ -12,7 +12,7 @@ from test_character import CHANNELS, COLUMNS, CONDITIONS, DT, NAMES, clips, driv
 
 import contextdb as cdb
 from contextdb import motion
-from contextdb.cells.outputs import ACCEPTED, RowPlay
+from contextdb.cells.row_play import ACCEPTED, RowPlay
 from contextdb.motion import Action, Controller, ControllerSettings, Entry, Selector, Trace
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.selection.decision import plays

@@ -8,7 +8,7 @@ from played import LOOPS, RATE, SCHEMA, bank, clips, database, decisions
 from test_rows_played import BLENDS, table_of
 
 from contextdb import motion
-from contextdb.cells.outputs import ROOTS
+from contextdb.cells.row_play import ROOTS
 from contextdb.errors import ContextError, MotionError
 from contextdb.motion import Action, PoseSettings, PoseStream, TablePlayer, Target
 

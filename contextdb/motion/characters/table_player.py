@@ -16,12 +16,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_mapping, require_real
-from contextdb.cells.outputs import RowPlay
+from contextdb.cells.row_play import RowPlay
 from contextdb.errors import Fault, MotionError, in_quotes, mend_for, some
 from contextdb.motion.answers import Answer
 from contextdb.motion.characters import tables as asking
 from contextdb.motion.characters.tables import Facts, Table, Unknown
-from contextdb.motion.clips.steering import OfBody, place_of
+from contextdb.motion.clips.ground_place import OfBody, place_of
 from contextdb.motion.output.stream import Pose, PoseState, PoseStream
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.selection.chooser import Chooser

@@ -14,13 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
 from contextdb.cells.arguments import as_number, require_many_of, require_point, require_real
 from contextdb.core import move_bodies, steer_paths
-from contextdb.errors import ContextError, Fault, MotionError
+from contextdb.errors import Fault, MotionError
 from contextdb.motion.clips.poses import LEAST_RATE, MOST_RATE
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.trajectory import MOST_REACH_S, Trajectory
@@ -136,22 +135,3 @@ def steered_path(
     positions[0, :n_past], headings[0, :n_past] = [body.position for body in past], [body.heading for body in past]
     steer_paths(np.array([past[-1].numbers]), _goal(wanted, facing), rate, n_past, positions, headings)
     return Trajectory(rate, positions[0], headings[0], n_past - 1)
-
-
-# ---- where a body is over the ground, as the game says it: a `Steered`, or three numbers
-
-GroundPlace: TypeAlias = tuple[float, float, float]
-"""x and z in metres, and a heading in radians."""
-OfBody: TypeAlias = Steered | GroundPlace
-A_BODY = "a Steered, or x and z in metres and a heading in radians"
-
-
-def place_of(body: OfBody | None) -> GroundPlace | None:
-    """The place of a body; None where none is given. Raises ContextError for what is none."""
-    if body is None:
-        return None
-    if isinstance(body, Steered):
-        return float(body.position[0]), float(body.position[1]), float(body.heading)
-    if not isinstance(body, (tuple, list, np.ndarray)) or len(body) != 3:
-        raise ContextError(Fault(f"body is {body!r}.", A_BODY))
-    return require_real(body[0], "x"), require_real(body[1], "z"), require_real(body[2], "heading")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Hashable
 from dataclasses import dataclass
 
-from contextdb.motion.clips.steering import GroundPlace
+from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.selection.choice import Choice, Search
 from contextdb.motion.selection.root_motion import RootMotion
 

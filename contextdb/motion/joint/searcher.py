@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike
 from contextdb.cells.arguments import as_number, require_kind, require_many_of, require_mapping, require_whole
 from contextdb.core import search_joint
 from contextdb.errors import ContextError, Fault, MotionError, QueryError, in_quotes, nearest, no_such, some
+from contextdb.motion.clips.ground_place import A_BODY, GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Ints
-from contextdb.motion.clips.steering import A_BODY, GroundPlace, OfBody, place_of
 from contextdb.motion.features.extraction import FARTHEST_M
 from contextdb.motion.joint.alignment import aligned, moved
 from contextdb.motion.joint.boxes import boxes_of, in_boxes

@@ -20,7 +20,7 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_real, require_text, require_whole
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, some
-from contextdb.motion.clips.steering import GroundPlace
+from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.joint.database import JointDatabase
 from contextdb.motion.joint.hit import JointHit
 from contextdb.motion.joint.searcher import JointOptions, JointSearcher, Places, Queries, places_of

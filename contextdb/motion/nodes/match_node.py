@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind, require_text
-from contextdb.cells.outputs import RowPlay
+from contextdb.cells.row_play import RowPlay
 from contextdb.core import aim
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes
 from contextdb.motion.answers import is_answer

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_mapping
-from contextdb.cells.outputs import ROOTS, RowPlay
+from contextdb.cells.row_play import ROOTS, RowPlay
 from contextdb.core import Poses, fill_plays, pose_columns
 from contextdb.errors import Fault, MotionError, in_quotes, no_such
 from contextdb.files.settings import settings_of

@@ -14,8 +14,9 @@ import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_real
 from contextdb.errors import ContextError, Fault, MotionError, plural
+from contextdb.motion.clips.ground_place import A_BODY, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.steering import A_BODY, OfBody, Steered, place_of
+from contextdb.motion.clips.steering import Steered
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.output.ground import A_GROUND, Ground
 from contextdb.motion.output.pipeline import COLUMNS, Pipeline, Rows

@@ -14,8 +14,8 @@ import numpy as np
 from contextdb.cells.arguments import require_many_of, require_real
 from contextdb.cells.sequences import ListSequence
 from contextdb.errors import ContextError, Fault, MotionError, Place, plural
+from contextdb.motion.clips.ground_place import OfBody
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.steering import OfBody
 from contextdb.motion.output.ground import MANY_GROUND, Ground, Grounds, ManyGround
 from contextdb.motion.output.pipeline import Rows
 from contextdb.motion.output.pose import CrowdPoses

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contextdb.cells.outputs import LEAST, MOST, RowPlay
+from contextdb.cells.row_play import LEAST, MOST, RowPlay
 from contextdb.core import Controllers, fill_ranges
 from contextdb.errors import Fault, QueryError, plural
 from contextdb.motion import arguments

@@ -26,8 +26,8 @@ from contextdb.cells.arguments import as_number, require_kind
 from contextdb.errors import Fault, MotionError, QueryError
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Flags
+from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.steering import GroundPlace, OfBody, place_of
 from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.records import quickly_made
 from contextdb.motion.search.hit import Hit

@@ -18,8 +18,8 @@ from contextdb.cells.sequences import ListSequence
 from contextdb.errors import ContextError, Fault, MotionError, Place, QueryError, plural
 from contextdb.motion import arguments
 from contextdb.motion.answers import are_answers
+from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.steering import GroundPlace, OfBody, place_of
 from contextdb.motion.records import collector_at_rest
 from contextdb.motion.selection.chooser import are_mappings
 from contextdb.motion.selection.controller import Asked, Controller, Decided, rows_of, seconds_of, update_all

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from contextdb.cells.outputs import RowPlay
+from contextdb.cells.row_play import RowPlay
 from contextdb.motion.records import quickly_made
 from contextdb.motion.selection.decision import Playing
 

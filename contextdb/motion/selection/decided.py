@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from contextdb.cells.outputs import RowPlay
+from contextdb.cells.row_play import RowPlay
+from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.steering import GroundPlace
 from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.filters import Filter

@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
-from contextdb.cells.outputs import RowPlay
+from contextdb.cells.row_play import RowPlay
 from contextdb.errors import in_quotes
+from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.steering import GroundPlace
 from contextdb.motion.records import Unfinished, quickly_made
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.search.filters import Filter

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from contextdb.errors import ContextError, Fault
+from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.steering import GroundPlace
 from contextdb.motion.selection.chooser import ASK, CAUSE, CHOSEN, DECIDE, WINNER, Plays
 from contextdb.motion.selection.controller import Asked, Controller, Decided, prepared
 from contextdb.motion.selection.decided import CAUSES, Asker, Question, decision_of

@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from contextdb.cells.outputs import RowPlay
-from contextdb.motion.clips.steering import GroundPlace
+from contextdb.cells.row_play import RowPlay
+from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.markup.tag_filter import TagFilter
 from contextdb.motion.search.candidates import Candidate, Candidates

@@ -28,8 +28,9 @@ import numpy as np
 from contextdb.cells.arguments import require_kind, require_many_of, require_real
 from contextdb.errors import ContextError, Fault, MotionError
 from contextdb.files.settings import Declared, number
+from contextdb.motion.clips.ground_place import A_BODY, OfBody, place_of
 from contextdb.motion.clips.quaternions import Floats
-from contextdb.motion.clips.steering import A_BODY, OfBody, Steered, place_of
+from contextdb.motion.clips.steering import Steered
 from contextdb.motion.output.ground import A_GROUND, Ground
 from contextdb.motion.output.legs import eased
 from contextdb.motion.output.samples import Place3

@@ -23,7 +23,7 @@ from contextdb.covering.assumed import Opened, assumptions_of
 from contextdb.covering.report import CoverageReport, Gap
 from contextdb.covering.ruled import without_rules
 from contextdb.covering.space import Box, Space
-from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
+from contextdb.covering.witness import BoxSet, Steps
 from contextdb.errors import ContextDBError, ContextError, Fault, Place, in_quotes, joined
 from contextdb.expressions.expression import read_expression
 from contextdb.files.reports import baseline_of
@@ -216,10 +216,7 @@ def _reads(cells: Mapping[str, str], domains: Mapping[str, Domain]) -> bool:
 
 def _is_held(box: Box | None, boxes: BoxSet, otherwise: bool) -> bool:
     """Whether some boxes hold a whole box; `otherwise` where the table cannot say it any more, or the search is too long."""
-    try:
-        return otherwise if box is None else boxes.outside(boxes.all, box, Steps(STEPS)) is None
-    except OutOfSteps:
-        return otherwise
+    return otherwise if box is None else boxes.hold(box, Steps(STEPS), otherwise)
 
 
 def _newly_dead(findings: Iterable[Finding], before: Counter[tuple[str, str]]) -> Iterable[Finding]:

@@ -148,6 +148,13 @@ class BoxSet:
                 open_boxes &= self.meeting(f, side)
         return next(self._contexts(open_boxes, within, steps), None)
 
+    def hold(self, box: Box, steps: Steps, otherwise: bool) -> bool:
+        """Whether every context of a box is in one of these; `otherwise` where the steps are used up before that is known."""
+        try:
+            return self.outside(self.all, box, steps) is None
+        except OutOfSteps:
+            return otherwise
+
     def points(self, within: Box, steps: Steps) -> Iterator[Point]:
         """Contexts of `within` that are in no box, one after the other, until there is none.
 

@@ -36,8 +36,8 @@ from contextdb.covering.count import uncovered_share
 from contextdb.covering.engine import WORK, finding_steps, search_steps
 from contextdb.covering.gaps import find_gaps
 from contextdb.covering.judge import Judge
+from contextdb.covering.report import wilson
 from contextdb.covering.sample import Sampler
-from contextdb.covering.shares import wilson
 from contextdb.covering.space import Space
 
 SAMPLES = 200_000

@@ -135,7 +135,6 @@ class Group:
         raise ContextDBError(Fault(problem, joined(list(self.commands), 6), mend))
 
     def parser(self, name: str, command: ModuleType) -> Parser:
-        """What reads the arguments of a command."""
         parser = _new_parser((*self.words, name), command.__doc__)
         command.add_arguments(parser)
         limits = parser.add_argument_group("limits")

@@ -65,7 +65,6 @@ class TextColumn:
 
     @classmethod
     def of(cls, name: str, texts: Iterable[str]) -> TextColumn:
-        """A column from one text a row."""
         known: dict[str, int] = {}
         codes = np.fromiter((known.setdefault(t, len(known)) for t in texts), np.int32)
         return cls(name, tuple(known), codes)
@@ -100,7 +99,6 @@ class TextColumn:
         return TextColumn(self.name, texts, codes)
 
     def with_rows_taken(self, rows: NDArray[np.int64]) -> TextColumn:
-        """The column with the given rows, in the given order."""
         return TextColumn(self.name, self.texts, self.codes[rows])
 
     def with_inserted(self, row: int, texts: Sequence[str]) -> TextColumn:

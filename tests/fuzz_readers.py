@@ -27,8 +27,7 @@ from contextdb import motion
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TAGS, TEXT, Domain
 from contextdb.cells.grammar import parse_cell
-from contextdb.commands.live_command import _show
-from contextdb.commands.live_views import Changes
+from contextdb.commands.live_command import Changes, _show
 from contextdb.covering.baseline import read_baseline
 from contextdb.disk.folder_lock import UNFINISHED
 from contextdb.errors import ContextDBError

@@ -7,7 +7,7 @@ from running import run
 
 import contextdb as cdb
 from contextdb.commands.motion_page import Played, parting_of
-from contextdb.commands.motion_stick import conditions_of
+from contextdb.commands.motion_run_command import conditions_of
 from contextdb.errors import ContextDBError
 from contextdb.motion import Action, Decision, Trace
 from contextdb.motion.selection.decision import Playing

@@ -6,8 +6,18 @@ import re
 import pytest
 from running import run
 
-from contextdb.commands.demo_command import sample_folder
-from contextdb.commands.demo_world import CATCH, DOWN_M, N_STEPS, RISE_M, SLOPE_M, STAIRS_M, cast_lines, ground, players
+from contextdb.commands.demo_command import (
+    CATCH,
+    DOWN_M,
+    N_STEPS,
+    RISE_M,
+    SLOPE_M,
+    STAIRS_M,
+    cast_lines,
+    ground,
+    players,
+    sample_folder,
+)
 from contextdb.motion import Markup, load_bvh
 from contextdb.motion.made.recipes import RECIPES
 from contextdb.tables.project import Project

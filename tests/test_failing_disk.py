@@ -263,8 +263,7 @@ ALLOWED = {
     "contextdb/motion/clips/parser_child.py": {"open", "os.open", "os.remove", "shutil.rmtree"},  # in that folder; nowhere
     "tui/model/played_run.py": {"TemporaryDirectory"},
     "contextdb/telemetry/link/game.py": {"path.open"},  # a recording, which grows while the game runs
-    "contextdb/telemetry/link/folder.py": {"os.open", "mkdir"},  # a lock, in a folder of this user alone
-    "contextdb/telemetry/link/doors.py": {"os.open", "os.chmod", "unlink"},  # sockets, and the token of a door
+    "contextdb/telemetry/link/doors.py": {"os.open", "mkdir", "os.chmod", "unlink"},  # a lock, sockets, and the token of a door
 }
 
 

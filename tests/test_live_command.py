@@ -16,7 +16,7 @@ from telemetry.links import meeting
 from warm_start import python
 
 import contextdb as cdb
-from contextdb.commands.live_views import Changes
+from contextdb.commands.live_command import Changes
 from contextdb.telemetry.link.lines import Line
 
 __all__ = ["meeting"]

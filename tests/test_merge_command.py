@@ -17,8 +17,7 @@ from contextdb import cli
 from contextdb.columns import TextColumn
 from contextdb.edits.diffing.markers import versions_of, with_markers
 from contextdb.files.csv_rewrite import rewritten
-from contextdb.tables.merging.merging import Merge, merge
-from contextdb.tables.merging.reading import table_of
+from contextdb.tables.merging.merging import Merge, merge, table_of
 from contextdb.tables.project import load
 from contextdb.tables.table import Table
 

@@ -15,7 +15,7 @@ from made_once import make_clip
 from running import Result, run
 
 from contextdb.cli import main
-from contextdb.commands import watched_work
+from contextdb.commands import motion_build_command
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.motion_check_command import check_path
 from contextdb.files.tensors import read_tensors
@@ -83,8 +83,8 @@ def test_watching_builds_again_with_the_clip_that_was_saved_alone(here: Path, mo
         if time_s[0] > 5.0:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(watched_work, "sleep", sleep)
-    monkeypatch.setattr(watched_work, "clock", lambda: time_s[0])
+    monkeypatch.setattr(motion_build_command, "sleep", sleep)
+    monkeypatch.setattr(motion_build_command, "clock", lambda: time_s[0])
     told = [json.loads(line) for line in build("game", "--json", "--watch").out.splitlines()]
     assert [{clip for each in document["databases"] for clip in each["computed"]} for document in told][1:] == [{"walk"}]
 

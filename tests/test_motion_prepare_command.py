@@ -13,8 +13,8 @@ from made_once import make_clip
 from running import Result, run
 from strategies import some
 
-from contextdb.commands import watched_work
-from contextdb.commands.motion_prepared import line_of, with_marks
+from contextdb.commands import motion_build_command
+from contextdb.commands.motion_prepare_command import line_of, with_marks
 from contextdb.motion import Markup, MotionConfig, write_bvh
 from contextdb.motion.features.extraction import clip_features
 from contextdb.motion.preparing.look import Look
@@ -254,8 +254,8 @@ def test_watching_does_it_again_for_each_saved_clip_and_tells_what_is_wrong(game
                 raise KeyboardInterrupt
             saves.pop(0)()
 
-    monkeypatch.setattr(watched_work, "sleep", sleep)
-    monkeypatch.setattr(watched_work, "clock", lambda: time_s[0])
+    monkeypatch.setattr(motion_build_command, "sleep", sleep)
+    monkeypatch.setattr(motion_build_command, "clock", lambda: time_s[0])
     told = prepare("game", "--only", "starts", "--write", "--watch")
     assert "+start_walk,NextNaturalOnly,0.733,1.167,0.2" in told.lines
     assert "+start_walk,NextNaturalOnly,1.583,2.217,0.2" in told.lines

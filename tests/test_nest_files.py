@@ -9,8 +9,7 @@ from nested_tables import flat_rows
 from running import run
 
 import contextdb as cdb
-from contextdb.checks.rows import check_rows
-from contextdb.checks.run import check
+from contextdb.checks.run import check, check_rows
 from contextdb.schema.settings import TableSettings
 from contextdb.tables.nesting.links import inner_rows
 from contextdb.tables.table import leaf_assets

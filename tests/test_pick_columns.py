@@ -7,8 +7,7 @@ import pytest
 from running import run
 
 import contextdb as cdb
-from contextdb.checks.rows import check_rows
-from contextdb.checks.run import check
+from contextdb.checks.run import check, check_rows
 from contextdb.compiled.artefact import COMPILED
 from contextdb.compiled.table import data_of
 from contextdb.edits.edits import check_cell

@@ -17,7 +17,7 @@ from contextdb.edits.renaming import renaming, uses_of
 from contextdb.edits.renaming_assets import asset_renaming
 from contextdb.edits.renaming_values import value_renaming
 from contextdb.errors import ContextDBError, FileError
-from contextdb.expressions.names import names_in
+from contextdb.expressions.tokens import names_in
 from contextdb.tables.project import Project, load
 
 TOML = """# a game

@@ -13,8 +13,7 @@ from strategies import examples
 import contextdb as cdb
 from contextdb.checks.cases import Case, judge
 from contextdb.checks.effects import effects
-from contextdb.checks.rows import check_rows, unused_conditions
-from contextdb.checks.run import check
+from contextdb.checks.run import check, check_rows, unused_conditions
 from contextdb.compiled.casting.roles import role_of
 from contextdb.compiled.stubs import stubs_of
 from contextdb.compiled.table import data_of

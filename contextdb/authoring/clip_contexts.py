@@ -29,7 +29,7 @@ from contextdb.covering.assumed import Opened, opened
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.sample import Sampler
 from contextdb.covering.space import Box, Sides, Space
-from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
+from contextdb.covering.witness import BoxSet, Steps
 from contextdb.errors import some
 from contextdb.motion.measuring.moves import DIRECTION, SPEED, TURN, ClipContexts
 from contextdb.schema.settings import derivation_of
@@ -260,16 +260,8 @@ class _Boxes:
     def never_valid(self, progress: Progress) -> Iterator[str]:
         """The clips whose rows are valid in no context that can happen."""
         outside = BoxSet.of(self.space.full, self.impossible, progress)
-        live = {asset for asset, box in self.rows if _can_happen(outside, box, progress)}
+        live = {asset for asset, box in self.rows if not outside.hold(box, Steps(STEPS, progress), False)}
         yield from (asset for asset in self.listed if asset not in live)
-
-
-def _can_happen(outside: BoxSet, box: Box, progress: Progress) -> bool:
-    """Whether some context of a box can happen; yes where the search is too long."""
-    try:
-        return outside.outside(outside.all, box, Steps(STEPS, progress)) is not None
-    except OutOfSteps:
-        return True
 
 
 def _cells(compiled: CompiledData, row: int) -> dict[str, Cell]:

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from contextdb.authoring.clip_looks import ClipAt, LeftOut, Looks, Seen
-from contextdb.authoring.saved_looks import SavedLooks, look_at_all
+from contextdb.authoring.clip_looks import ClipAt, LeftOut, Looks, SavedLooks, Seen, look_at_all
 from contextdb.disk import path_in_quotes
 from contextdb.disk.boundary import inside
 from contextdb.disk.engines import Engines, here
@@ -59,7 +58,6 @@ class FolderClips:
 
     @property
     def clips(self) -> list[ClipHead]:
-        """The clips, without their motion."""
         return [seen.head for seen in self.seen]
 
     def facts(self) -> list[ClipFacts]:
@@ -81,7 +79,6 @@ class FolderClips:
 
     @property
     def paths(self) -> list[Path]:
-        """The file of each clip."""
         return [at.file for at in self.places]
 
 

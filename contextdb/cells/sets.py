@@ -63,7 +63,6 @@ class TagSet:
     is_complement: bool = False
 
     def holds(self, tags: frozenset[str]) -> bool:
-        """Whether a set of tags is among them."""
         covered = covered_by(tags)
         return (self.needs <= covered and self.bans.isdisjoint(covered)) is not self.is_complement
 
@@ -74,7 +73,6 @@ class TagSet:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no set of tags is among them."""
         return not (self.needs or self.bans) if self.is_complement else self.is_contradiction
 
 
@@ -103,7 +101,6 @@ class Cell:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no value at all matches."""
         return self.accepts is not None and self.accepts.is_empty
 
     def holds(self, value: object) -> bool:
@@ -148,12 +145,10 @@ class TagMeet(TagSet):
         return cls(needs, bans, True, tuple(parts))
 
     def holds(self, tags: frozenset[str]) -> bool:
-        """Whether a set of tags is in every part."""
         return all(part.holds(tags) for part in self.parts)
 
     @property
     def is_empty(self) -> bool:
-        """Whether no set of tags is in every part."""
         return not self.meets(TagSet(frozenset()))
 
     def meets(self, plain: TagSet) -> bool:

@@ -24,9 +24,8 @@ from contextdb.bitmask import Flags
 from contextdb.checks.slips import Slips, flags_of
 from contextdb.covering.assumed import Opened, opened
 from contextdb.covering.fewest import fewest
-from contextdb.covering.moments import Moment, Moments
+from contextdb.covering.moments import Moment, Moments, Preferred
 from contextdb.covering.points import PointFinder
-from contextdb.covering.preferred import Preferred
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.sample import CHUNK, Sampler
 from contextdb.covering.space import Box
@@ -92,7 +91,6 @@ class _Search:
 
     @cached_property
     def _rows(self) -> NDArray[np.int64]:
-        """The row of each box of the space."""
         return np.array(self.ready.space.rows, np.int64)
 
     @cached_property

@@ -29,7 +29,7 @@ from contextdb.columns import TextColumn
 from contextdb.compiled.data import CompiledData
 from contextdb.compiled.table import data_of
 from contextdb.covering.baseline import CaseCounts
-from contextdb.covering.shares import format_percent
+from contextdb.covering.report import format_percent
 from contextdb.disk import write_atomic
 from contextdb.errors import CellError, ContextError, Fault, Place, TableError, in_quotes, mend_for, nearest, plural, some
 from contextdb.files.csv_rewrite import Origin

@@ -314,7 +314,6 @@ class Measure:
         return boxes, report.gaps_complete
 
     def common(self, one: Box, other: Box) -> list[Box]:
-        """What two boxes share."""
         return self._measured(meet(one.cells, other.cells, self.space.conditions))
 
     def _measured(self, parts: Sequence[Cells]) -> list[Box]:

@@ -112,7 +112,6 @@ class Slips:
 
     @cached_property
     def _rows(self) -> NDArray[np.int64]:
-        """The row of each slip."""
         return np.array([slip.row for slip in self.slips], np.int64)
 
     @cached_property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -52,6 +52,17 @@ def take_page_arguments(arguments: argparse.Namespace) -> None:
         raise QueryError(Fault(f"-o writes a page, and --format {arguments.format} prints.", "--format html with -o FILE"))
     elif arguments.format != "text":
         setattr(arguments, arguments.format, True)
+
+
+def answer(arguments: argparse.Namespace, document: Callable[[], Mapping[str, object]], lines: Callable[[], Iterable[str]]) -> None:
+    """Print an answer: with --json its document, else its lines."""
+    with output():
+        if arguments.json:
+            from contextdb.report.render_json import as_json
+
+            print(as_json({"format": 1, **document()}), end="")
+        else:
+            print(*lines(), sep="\n")
 
 
 @contextmanager

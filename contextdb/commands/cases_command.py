@@ -20,12 +20,12 @@ from contextdb.cells.facts import fact_text
 from contextdb.checks.case_contexts import Reach, contexts_for
 from contextdb.checks.cases import Case, exactly, judge, keep_cases, question_of, read_cases
 from contextdb.checks.slips import LEFT_OUT, PICKED, VALID, Slip, Slips, flags_of
+from contextdb.commands import answer
 from contextdb.commands.progress import has_many_cells, log_of
 from contextdb.compiled.table import data_of
-from contextdb.console import ExitCode, aligned, output, printable
+from contextdb.console import ExitCode, aligned, printable
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.errors import plural
-from contextdb.report.render_json import as_json
 from contextdb.tables.other_files import cases_path
 from contextdb.tables.places import table_path
 from contextdb.tables.project import load_table
@@ -53,13 +53,12 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     if arguments.write and new:
         keep_cases(file, new)
     n_written = len(new) if arguments.write else 0
-    if arguments.json:
-        contexts = [{"name": c.name, "facts": dict(c.facts), "expected": c.expected, "note": c.note} for c in new]
-        text = as_json({"format": 1, "table": table.name, **_json(reached), "written": n_written, "contexts": contexts})
-    else:
-        text = "\n".join([*_lines(reached, arguments.all), *_more(reached, len(new), file, arguments.write), ""])
-    with output():
-        print(text, end="")
+    contexts = [{"name": c.name, "facts": dict(c.facts), "expected": c.expected, "note": c.note} for c in new]
+    answer(
+        arguments,
+        lambda: {"table": table.name, **_json(reached), "written": n_written, "contexts": contexts},
+        lambda: [*_lines(reached, arguments.all), *_more(reached, len(new), file, arguments.write)],
+    )
     return ExitCode.OK
 
 

@@ -22,8 +22,7 @@ from contextdb import report
 from contextdb.cells.row_play import RowPlay
 from contextdb.checks.cases import CaseBar, check_cases, read_cases
 from contextdb.checks.contracts import contract_findings, proofs_of, strayed
-from contextdb.checks.rows import check_rows, unused_conditions
-from contextdb.checks.run import check
+from contextdb.checks.run import check, check_rows, unused_conditions
 from contextdb.commands import add_format_arguments, deliver, is_coloured
 from contextdb.commands.numbers import percent, whole_type
 from contextdb.commands.progress import Bar, has_many_cells, log_of

@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from contextdb.commands import add_format_arguments, coverage_telemetry, deliver, is_coloured
+from contextdb.commands import add_format_arguments, deliver, is_coloured
 from contextdb.commands.gating import (
     Accepted,
     add_accepting_arguments,
@@ -30,8 +30,9 @@ from contextdb.commands.gating import (
     with_gates,
 )
 from contextdb.commands.numbers import percent
-from contextdb.commands.progress import Bar, bar, has_many_cells
-from contextdb.console import ExitCode, printable, terminal_width
+from contextdb.commands.progress import Bar, bar, has_many_bytes, has_many_cells
+from contextdb.console import ExitCode, note, printable, terminal_width
+from contextdb.covering import Gap
 from contextdb.covering.baseline import ACCEPTED, Baseline, CaseCounts, read_baseline
 from contextdb.covering.engine import MOST_GAPS, SAMPLES, WORK
 from contextdb.covering.expected import Expectation
@@ -49,6 +50,8 @@ from contextdb.tables.places import table_path
 from contextdb.tables.project import SCHEMA_FILE, Project, load_table
 from contextdb.tables.table import EitherTable, Table
 from contextdb.tables.variants import WholeTable
+from contextdb.telemetry import Observed
+from contextdb.telemetry.contexts import context_files
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -74,7 +77,7 @@ def add_measuring_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fail-under-expected", type=percent, metavar="PCT", help="fail if the covered percentage of what is expected is lower"
     )
-    coverage_telemetry.add_arguments(parser, percent)
+    add_telemetry_arguments(parser, percent)
 
 
 def run(arguments: argparse.Namespace) -> ExitCode:
@@ -134,7 +137,7 @@ class Tables:
 
 def _require_sense(arguments: argparse.Namespace) -> None:
     require_baseline(arguments, bool(arguments.baseline))
-    coverage_telemetry.require_telemetry(arguments)
+    require_telemetry(arguments)
     is_detail = arguments.gap is not None or arguments.explain is not None
     names = ("fail_under", "fail_under_expected", "fail_under_telemetry", "max_drop", "baseline")
     bars = [f"--{name.replace('_', '-')}" for name in names if getattr(arguments, name) is not None]
@@ -174,7 +177,7 @@ def measured_results(
 
 def _ranked(arguments: argparse.Namespace, measured: Measured, table: EitherTable) -> Measured:
     """With the gaps in their order, and the work on them. Raises FileError where the file of that cannot be read."""
-    ranked = coverage_telemetry.ranked(arguments, measured, table)
+    ranked = ranked_by_moments(arguments, measured, table)
     work = GapWork({}) if table.path is None else GapWork.beside(table.path)
     return ranked.with_work(work, [column.condition for column in table.conditions]) if work.lines else ranked
 
@@ -194,7 +197,7 @@ def _measured(arguments: argparse.Namespace, table: EitherTable) -> Measured:
 def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
     """The coverage of one table and of its pairs of conditions, by the budgets of the arguments."""
     from contextdb.covering import coverage
-    from contextdb.covering.declared import declared
+    from contextdb.covering.baseline import declared
     from contextdb.report.coverage_results import Measured
 
     with _placed(table):
@@ -207,7 +210,7 @@ def measure(arguments: argparse.Namespace, table: EitherTable) -> Measured:
                 max_gaps=MOST_GAPS,
                 progress=_tell(progress),
             )
-        seen = coverage_telemetry.observed(arguments, table, report.gaps)
+        seen = observed(arguments, table, report.gaps)
         expected = _expected(arguments, table)
         compared = _pairs(arguments, table)
     lines = tuple(table.place(row).line for row in range(table.n_rows))
@@ -311,8 +314,83 @@ def _only(tables: Sequence[EitherTable]) -> EitherTable:
 
 
 def _count(text: str) -> int:
-    """A whole number from 0 up."""
     plain = text.replace("_", "").replace(",", "")
     if not (plain.isascii() and plain.isdecimal()) or len(plain) > 15:
         raise argparse.ArgumentTypeError(f"{in_quotes(text)} is not a whole number from 0 up.")
     return int(plain)
+
+
+# ---- the part of `contextdb coverage` that evaluates recorded contexts
+
+ENGINES = ("local", "dask")
+
+
+def add_telemetry_arguments(parser: argparse.ArgumentParser, percent: Callable[[str], float]) -> None:
+    group = parser.add_argument_group("recorded contexts")
+    group.add_argument(
+        "--telemetry",
+        action="append",
+        metavar="GLOB",
+        help="CSV or Parquet files with a column for each fact, or recordings (.jsonl); may be repeated",
+    )
+    group.add_argument(
+        "--fail-under-telemetry", type=percent, metavar="PCT", help="fail if the covered percentage of recorded moments is lower"
+    )
+    group.add_argument("--count", metavar="COLUMN", help="the column that says how often each moment was seen")
+    group.add_argument("--engine", choices=ENGINES, default="local", help="read files here, or on Dask workers (default: local)")
+    group.add_argument("--scheduler", metavar="ADDRESS", help="the Dask scheduler; without it, workers on this machine")
+    group.add_argument(
+        "--resume", metavar="FOLDER", help="keep the sums of finished files, and continue from them after an interruption"
+    )
+
+
+def require_telemetry(arguments: argparse.Namespace) -> None:
+    """Refuse options about telemetry where there is none: raises ContextError that names the first of them."""
+    if arguments.telemetry:
+        if arguments.scheduler is not None and arguments.engine != "dask":
+            raise ContextError(Fault("--scheduler is the address of Dask's.", "--engine dask with it"))
+        return
+    given = {
+        "--fail-under-telemetry": arguments.fail_under_telemetry is not None,
+        "--count": arguments.count is not None,
+        "--engine": arguments.engine != "local",
+        "--scheduler": arguments.scheduler is not None,
+        "--resume": arguments.resume is not None,
+    }
+    for option, is_given in given.items():
+        if is_given:
+            raise ContextError(Fault(f"{option} is about recorded contexts.", "--telemetry GLOB with it"))
+
+
+def observed(arguments: argparse.Namespace, table: EitherTable, known: Sequence[Gap]) -> Observed | None:
+    """What the recorded contexts say of a table and its gaps; None where no files were named. Files not read are reported."""
+    if not arguments.telemetry:
+        return None
+    from contextdb.telemetry import observe
+
+    files = [file for pattern in arguments.telemetry for file in context_files(pattern)]
+    with bar(f"reading telemetry for {printable(table.name)}", has_many_bytes(files)) as tell:
+        result = observe(
+            table,
+            arguments.telemetry,
+            count=arguments.count,
+            engine=arguments.engine,
+            scheduler=arguments.scheduler,
+            progress=tell,
+            resume=arguments.resume,
+            known=known,
+        )
+    for file in result.unread:
+        note(*file.faults)
+    return result
+
+
+def ranked_by_moments(arguments: argparse.Namespace, measured: Measured, table: EitherTable) -> Measured:
+    """What was measured, with the gaps ranked by the recorded contexts, where there are any."""
+    if measured.telemetry is None:
+        return measured
+    from contextdb.covering.assumed import opened
+    from contextdb.telemetry.seen_gaps import ranked as by_moments
+
+    report = by_moments(measured.report, opened(table), measured.telemetry, arguments.work, arguments.samples)
+    return replace(measured, report=report)

@@ -13,7 +13,7 @@ from contextdb.commands.motion_replay_command import databases_of, project_of
 from contextdb.commands.progress import bar, has_many_bytes
 from contextdb.compiled.table import data_of
 from contextdb.console import note, printable, progress, terminal_width
-from contextdb.covering.shares import format_percent
+from contextdb.covering.report import format_percent
 from contextdb.errors import Fault, MotionError, Place, plural, safe_text
 from contextdb.motion.trace.reasked import Reasked
 from contextdb.motion.trace.reasked_decision import ReaskedDecision, asset_of, chosen_of

@@ -47,7 +47,6 @@ def _cell(changes: Diff, change: CellChange) -> Sequence[str]:
 
 
 def _effect(effect: Effects | Fault | None) -> Iterator[Block]:
-    """What the change does to the answers."""
     rows = [] if effect is None else [Row(lines, (heading,)) for heading, lines in headings(effect, shows_all=True)]
     if rows:
         yield Rows(TITLE.capitalize(), rows)

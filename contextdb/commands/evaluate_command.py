@@ -25,16 +25,15 @@ import polars as pl
 
 from contextdb.bitmask import Rows
 from contextdb.cells.facts import UNKNOWN_MODES
-from contextdb.commands import missing_facts_by_option
-from contextdb.commands.coverage_telemetry import ENGINES
+from contextdb.commands import answer, missing_facts_by_option
+from contextdb.commands.coverage_command import ENGINES
 from contextdb.commands.progress import bar, has_many_bytes
 from contextdb.compiled.table import CompiledTable
-from contextdb.console import ExitCode, aligned, output, printable, styled, wants_colour
+from contextdb.console import ExitCode, aligned, printable, styled, wants_colour
 from contextdb.disk import TABLE_SUFFIXES, is_stream, path_in_quotes, real_path, refused_writing, write_atomic
 from contextdb.disk.folder_lock import temporary_folder
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, Place, plural
 from contextdb.files.texts import is_parquet
-from contextdb.report.render_json import as_json
 from contextdb.tables.places import open_compiled
 from contextdb.telemetry.contexts import context_files
 from contextdb.telemetry.evaluate_file import Answered
@@ -69,11 +68,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     sums = list(answered.values())
     n_contexts, n_without = sum(a.contexts for a in sums), sum(a.without for a in sums)
     hits = np.sum([a.hits for a in sums], axis=0)
-    with output():
-        if arguments.json:
-            print(as_json(_document(compiled, n_contexts, n_without, hits)), end="")
-        else:
-            print(*_lines(compiled, n_contexts, n_without, hits), sep="\n")
+    about = (compiled, n_contexts, n_without, hits)
+    answer(arguments, lambda: _document(*about), lambda: _lines(*about))
     return ExitCode.OK
 
 
@@ -174,7 +170,7 @@ def _write(answered: Mapping[Path, Answered], folder: Path, out: Path) -> None:
 
 def _document(compiled: CompiledTable, n_contexts: int, n_without: int, hits: Rows) -> dict[str, object]:
     rows = [{"row": r, "asset": a, "hits": int(h)} for r, (a, h) in enumerate(zip(compiled.assets, hits, strict=True))]
-    return {"format": 1, "table": compiled.name, "contexts": n_contexts, "without_asset": n_without, "rows": rows}
+    return {"table": compiled.name, "contexts": n_contexts, "without_asset": n_without, "rows": rows}
 
 
 def _lines(compiled: CompiledTable, n_contexts: int, n_without: int, hits: Rows) -> Iterator[str]:

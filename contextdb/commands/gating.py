@@ -12,8 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
-from contextdb.covering.baseline import Baseline, CaseCounts, Change, Earlier, compared, of_another_space
-from contextdb.covering.declared import differences
+from contextdb.covering.baseline import Baseline, CaseCounts, Change, Earlier, compared, differences, of_another_space
 from contextdb.disk import read_bytes
 from contextdb.errors import ContextError, Fault, Place, in_quotes, mend_for, some
 from contextdb.report.coverage_results import (

@@ -75,7 +75,6 @@ class Setup:
         return read_bytes(self.attributes) if self.attributes.is_file() else b""
 
     def value(self, key: str) -> str | None:
-        """What the configuration says under a key."""
         output = self.git("config", self.scope, "--get", "--null", key, accepts=(0, 1))
         return output.removesuffix("\0") if output else None
 

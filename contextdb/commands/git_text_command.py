@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextdb.console import ExitCode, output, printable
 from contextdb.disk import read_bytes
 from contextdb.errors import TableError
-from contextdb.tables.merging.reading import table_of
+from contextdb.tables.merging.merging import table_of
 from contextdb.tables.table import Table
 
 

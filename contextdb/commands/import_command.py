@@ -20,21 +20,37 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from contextdb.cells.kinds import KINDS
-from contextdb.commands.import_learn import learn, require_learning
 from contextdb.console import ExitCode, aligned, output, printable
+from contextdb.covering.report import format_percent
 from contextdb.disk import TABLE_SUFFIXES, is_stream, path_in_quotes, read_bytes
-from contextdb.errors import ContextDBError, Fault, FileError, Place, in_quotes, mend_for, nearest, plural, row_name
+from contextdb.errors import (
+    ContextDBError,
+    Fault,
+    FileError,
+    Place,
+    in_quotes,
+    mend_for,
+    nearest,
+    plural,
+    row_name,
+    safe_text,
+    some,
+)
 from contextdb.exchange import importing
 from contextdb.exchange.formats import FORMATS, ReadOptions, read
 from contextdb.exchange.importing import Choices, choices_of, chosen_columns, remember
-from contextdb.exchange.mapping import JOBS, Mapped, as_job, as_type, propose
+from contextdb.exchange.learned import Learned, learned
+from contextdb.exchange.mapping import JOBS, Mapped, as_condition, as_job, as_type, propose
 from contextdb.exchange.reading import Reading, listed, with_intervals
 from contextdb.files.file_names import require_new_table_name
+from contextdb.files.texts import written_over
 from contextdb.schema.shapes import KIND_SYNONYMS
 from contextdb.tables.project import SCHEMA_FILE
 
@@ -259,3 +275,80 @@ def _fault_lines(plan: importing.Plan) -> list[str]:
     listed = [f"  {f.place.column}, {row_name(f.place.row or 0)}: {f.message}" for f in faults[:3]]
     more = f"  and {len(faults) - 3:,} more: contextdb check {plan.path}" if len(faults) > 3 else ""
     return [f"{plural(len(faults), 'cell')} cannot be read:", *map(printable, listed), *([more] if more else [])]
+
+
+# ---- the part of `contextdb import` that learns a table from recorded pairs of facts and an asset
+
+HERE = Path("learned.csv")
+"""A table in the folder here, whose contextdb.toml counts where no other is named."""
+MOST_LISTED = 5
+
+
+def require_learning(arguments: argparse.Namespace) -> None:
+    """Refuse --learn and --asset without each other, and an import to nowhere."""
+    if arguments.learn != (arguments.asset is not None):
+        given, missing = ("--learn", "--asset COLUMN") if arguments.learn else ("--asset", "--learn")
+        raise ContextDBError(Fault(f"{given} needs {missing}.", "--learn --asset COLUMN"))
+    if arguments.target is None and not arguments.learn:
+        raise ContextDBError(Fault("DST is missing.", "a table file to write: .csv or .parquet"))
+
+
+def learn(reading: Reading, renames: dict[str, str], arguments: argparse.Namespace, name: str) -> ExitCode:
+    """Write the table that recorded pairs make, or print it where no file is named; the rest goes to standard error. The code is 1
+    where there is nothing to learn."""
+    target = HERE if arguments.target is None else Path(arguments.target)
+    schema, settings = importing.project_of(target)
+    if arguments.asset not in reading.names:
+        mend = mend_for(arguments.asset, reading.names)
+        raise ContextDBError(Fault(f"--asset: there is no column {in_quotes(arguments.asset)}.", some(reading.names), mend))
+    mapped = []
+    for column in propose(reading, schema, replace(settings, asset=None), renames):
+        if column.source == arguments.asset:
+            mapped.append(as_job(column, "asset"))
+        elif column.job == "asset":
+            mapped.append(as_condition(column, reading.column(column.source), column.name, schema))
+        elif column.job == "condition":
+            mapped.append(column)
+    result = learned(reading, mapped, schema)
+    for line in _learned_lines(result, reading, name):
+        print(printable(line), file=sys.stderr)
+    if not result.is_worth_it:
+        return ExitCode.FOUND
+    if arguments.target is None:
+        columns = result.reading.columns
+        raw = written_over(None, columns, np.full(result.reading.n_rows, -1), as_parquet=False).raw
+        with output():
+            print(raw.decode(), end="")
+    elif not arguments.dry_run:
+        plan = importing.plan_import(result.reading, target, mapped=result.columns)
+        plan.write()
+        with output():
+            print(printable(f"{target}: {plural(plan.table.n_rows, 'row')} of {plural(len(plan.table.conditions), 'condition')}"))
+    return ExitCode.OK
+
+
+def _learned_lines(result: Learned, reading: Reading, name: str) -> Iterator[str]:
+    pairs = plural(result.n_pairs, "pair")
+    left_out = f"; {plural(result.n_missing, 'row')} without an asset or with a missing fact left out" if result.n_missing else ""
+    yield f"{name}: {pairs} of facts and an asset{left_out}."
+    held = f"{format_percent(result.held_out)} of the held-out pairs"
+    if not result.is_worth_it:
+        always = format_percent(result.baseline)
+        yield f"Nothing to learn: the facts tell the asset in {held}, and always the commonest asset is right in {always}."
+        return
+    yield f"{plural(result.reading.n_rows, 'row')}; rows learned from four of five pairs are right in {held}."
+    if result.idle:
+        yield f"Without influence, so without a column: {some(result.idle)}."
+    if result.n_exceptions:
+        yield f"{plural(result.n_exceptions, 'exception')}, where the rows say otherwise than the recording:"
+        yield from (f"  {line}" for line in _exceptions(result, reading, result.exceptions[:MOST_LISTED]))
+        if result.n_exceptions > MOST_LISTED:
+            yield f"  and {result.n_exceptions - MOST_LISTED:,} more"
+
+
+def _exceptions(result: Learned, reading: Reading, rows: Sequence[int]) -> Iterator[str]:
+    for row in rows:
+        line = reading.source.line(row) if reading.source is not None else None
+        place = f"row {row + 1}" if line is None else f"line {line}"
+        facts = " ".join(f"{column.name}={column[row]}" for column in reading.columns)
+        yield f"{place}: {safe_text(facts, 200)}"

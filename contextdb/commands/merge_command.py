@@ -31,8 +31,7 @@ from contextdb.files.texts import is_parquet
 from contextdb.schema.settings import EMPTY, Schema, TableSettings
 from contextdb.tables.gap_work import merge_gap_work
 from contextdb.tables.merging.conflicts import Side
-from contextdb.tables.merging.merging import Merge, merge
-from contextdb.tables.merging.reading import merged_bytes, table_of
+from contextdb.tables.merging.merging import Merge, merge, merged_bytes, table_of
 from contextdb.tables.project import neighbours, schema_for, settings_of
 from contextdb.tables.table import Table
 

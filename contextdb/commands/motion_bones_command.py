@@ -16,13 +16,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from contextdb.authoring.clip_folder import clips_below
+from contextdb.commands import answer
 from contextdb.commands.numbers import unit_of
-from contextdb.console import ExitCode, aligned, output, printable
+from contextdb.console import ExitCode, aligned, printable
 from contextdb.errors import plural
 from contextdb.motion.clips.clip import CENTIMETRE, UPS, Clip
 from contextdb.motion.clips.foot_bones import Rig
 from contextdb.motion.clips.source import clips_by_file
-from contextdb.report.render_json import as_json
 
 HEADER = ("bone", "channels", "height m", "role", "mirrored to")
 
@@ -45,11 +45,11 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         key = (clip.skeleton.names, tuple(clip.skeleton.parents.tolist()), clip.skeleton.channels)
         rigs.setdefault(key, []).append(i)
     groups = [(list(dict.fromkeys(clips[i][0] for i in members)), clips[members[0]][1]) for members in rigs.values()]
-    with output():
-        if arguments.json:
-            print(as_json({"format": 1, "rigs": [_document(files, clip) for files, clip in groups]}), end="")
-        else:
-            print("\n\n".join("\n".join(_lines(files, clip)) for files, clip in groups))
+    answer(
+        arguments,
+        lambda: {"rigs": [_document(*each) for each in groups]},
+        lambda: ["\n\n".join("\n".join(_lines(*each)) for each in groups)],
+    )
     return ExitCode.OK
 
 

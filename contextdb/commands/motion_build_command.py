@@ -18,8 +18,11 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
+import sys
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -27,17 +30,19 @@ from pathlib import Path
 from contextdb.cells.conditions import Condition
 from contextdb.cells.mirroring import changed_in_mirror, mirrored_fact, partner_of, way_of
 from contextdb.commands.engine_options import add_engine_arguments, engines_of
+from contextdb.commands.numbers import unit_of
 from contextdb.commands.progress import building_bar
-from contextdb.commands.watched_work import watched
 from contextdb.compiled.table import CompiledTable
 from contextdb.console import ExitCode, aligned, note, output
-from contextdb.disk import make_folder, path_in_quotes, write_atomic
+from contextdb.disk import TABLE_SUFFIXES, make_folder, path_in_quotes, write_atomic
 from contextdb.disk.engines import Engines
 from contextdb.errors import ContextDBError, Fault, FileError, MotionError, Place, in_quotes, plural, some
 from contextdb.files.tensors import other_layout
 from contextdb.motion.characters.facts import FACTS, is_asked
 from contextdb.motion.characters.played import of_played
+from contextdb.motion.clips.clip import UPS
 from contextdb.motion.clips.doubts import grouped
+from contextdb.motion.clips.source import ENDINGS
 from contextdb.motion.nodes.match_node import MatchNode
 from contextdb.motion.search.database import MotionDatabase
 from contextdb.motion.storage import building
@@ -46,10 +51,13 @@ from contextdb.motion.storage.building import Built, saved_path
 from contextdb.motion.storage.bundle import Played, TableFile, bundle_of
 from contextdb.motion.storage.clip_files import unmatched
 from contextdb.motion.storage.config import MotionConfig
+from contextdb.motion.storage.database_settings import ROOTS
 from contextdb.motion.storage.pose_files import poses_alone, poses_path, save_poses
 from contextdb.motion.storage.stored import STORED, save_database
-from contextdb.tables.project import SCHEMA_FILE, Project
+from contextdb.tables.project import SCHEMA_FILE, Project, folder_of
 from contextdb.tables.table import Table, leaf_assets
+from contextdb.tables.watching.rest import Rest, Stamps, look
+from contextdb.tables.watching.watcher import POLL_S, SETTLE_S, SHORTEST_WAIT_S
 
 HEADER = ("database", "assets", "clips", "frames", "features", "MB", "computed", "cached", "file")
 
@@ -314,3 +322,82 @@ def _mirror_text(table: str, condition: Condition) -> str:
         problem = f"a bundle cannot exchange the facts of the condition {in_quotes(condition.name)} in a mirror yet."
         raise MotionError(Fault(problem, 'mirror = "negate", or names of an enum', place=Place(f"[tables.{table}]")))
     return "v=" + " ".join(str(values.index(str(mirrored_fact(value, condition)))) for value in values)
+
+
+# ---- work on a folder of clips done again whenever its files change: `--watch` of `motion build` and `motion prepare`. An
+# edge: this looks at disk and clock
+
+SUFFIXES = (*ENDINGS, *TABLE_SUFFIXES)
+"""What clips, tables and markup are in, next to contextdb.toml."""
+
+sleep, clock = time.sleep, time.monotonic
+
+
+def watched(path: str, work: Callable[[], ExitCode]) -> ExitCode:
+    """Do some work on a folder now, and again when files in it have changed and rested; ends with Ctrl+C.
+
+    Says what is wrong; the next change may mend it. Raises FileError where there is no such folder.
+    """
+    folder = folder_of(Path(path))
+    seen: Stamps = look(_files(folder))
+    rest = Rest(seen, clock(), SETTLE_S)
+    try:
+        while True:
+            _done(work)
+            note(f"watching {folder}. Ctrl+C ends it.")
+            seen = _next(folder, seen, rest)
+    except KeyboardInterrupt:  # how it ends
+        return ExitCode.OK
+
+
+def _next(folder: Path, before: Stamps, rest: Rest) -> Stamps:
+    """The stamps of the files when they have changed, and rest."""
+    while True:
+        seen, now = look(_files(folder)), clock()
+        if rest.is_due(seen, now) and seen != before:
+            rest.taken(now)
+            return seen
+        rest_s = rest.wait_s(now)
+        sleep(POLL_S if rest_s is None else min(POLL_S, max(rest_s, SHORTEST_WAIT_S)))
+
+
+def _done(work: Callable[[], ExitCode]) -> None:
+    try:
+        work()
+    except ContextDBError as error:
+        note(*error.faults)
+    sys.stdout.flush()
+
+
+def _files(folder: Path) -> list[Path]:
+    """What the work may depend on, in the folder and below; hidden folders, such as that of the cache, are passed over."""
+    files = []
+    for at, folders, names in os.walk(folder):
+        folders[:] = [name for name in folders if not name.startswith(".")]
+        files += [Path(at) / name for name in names if name == SCHEMA_FILE or name.lower().endswith(SUFFIXES)]
+    return sorted(files)
+
+
+# ---- what the commands on clips share: the folder, the unit and the axis as arguments, and progress clip by clip
+
+
+def add_clip_arguments(parser: argparse.ArgumentParser) -> None:
+    """The folder, and what its files leave open."""
+    parser.add_argument("path", metavar="FOLDER", help=f"a folder of clips, or of tables with {SCHEMA_FILE}")
+    parser.add_argument(
+        "--metres-per-unit", metavar="M", type=unit_of, help="the unit of the files (default: as the project says, else by size)"
+    )
+    parser.add_argument(
+        "--up", choices=UPS, help="the axis that points up (default: as the project says, else in which bodies stand)"
+    )
+    parser.add_argument(
+        "--root-from",
+        choices=ROOTS,
+        help="where clips that run on the spot get their motion: from themselves, or from their standing feet; in a project its "
+        "databases say it",
+    )
+    add_engine_arguments(parser)
+
+
+progress_of = partial(building_bar, tells_few=False)
+"""The progress of work on clips, one by one."""

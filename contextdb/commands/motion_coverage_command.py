@@ -28,7 +28,7 @@ from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.numbers import number_type, percent
 from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, note, terminal_width
-from contextdb.covering.declared import NOTHING, declared, differences
+from contextdb.covering.baseline import NOTHING, declared, differences
 from contextdb.errors import ContextError, Fault, in_quotes, mend_for, some
 from contextdb.motion.measuring.usage import NEAR_COST, PATTERN
 from contextdb.motion.storage.building import open_or_build

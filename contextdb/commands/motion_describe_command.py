@@ -30,7 +30,7 @@ from contextdb.authoring.described_table import (
     rows_for,
 )
 from contextdb.commands.engine_options import engines_of
-from contextdb.commands.motion_clips import add_clip_arguments, progress_of
+from contextdb.commands.motion_build_command import add_clip_arguments, progress_of
 from contextdb.console import ExitCode, note, output, printable
 from contextdb.errors import ContextDBError, Fault, plural, some
 from contextdb.files.toml_shapes import as_toml

@@ -17,10 +17,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from contextdb.authoring.weights import weights_change
+from contextdb.commands import answer
 from contextdb.commands.motion_build_command import MotionProject
 from contextdb.commands.motion_replay_command import project_of
 from contextdb.commands.progress import building_bar
-from contextdb.console import ExitCode, note, output, printable, terminal_width
+from contextdb.console import ExitCode, note, printable, terminal_width
 from contextdb.disk.boundary import real_path
 from contextdb.errors import Fault, MotionError, Place, QueryError, plural
 from contextdb.motion import open_or_build
@@ -31,7 +32,6 @@ from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.text_table import Column, table_lines
 from contextdb.motion.trace.what_if import WhatIf, what_if
-from contextdb.report.render_json import as_json
 from contextdb.tables.project import SCHEMA_FILE, Project
 
 
@@ -52,11 +52,11 @@ def run(arguments: argparse.Namespace) -> ExitCode:
             change = weights_change(Path(folder, SCHEMA_FILE), features, own)
             if change is not None:
                 change.write()
-    with output():
-        if arguments.json:
-            print(as_json(_document(learned, effects, bool(weights), arguments.write)), end="")
-        else:
-            print(*map(printable, _lines(learned, effects, terminal_width())), sep="\n")
+    answer(
+        arguments,
+        lambda: _document(learned, effects, bool(weights), arguments.write),
+        lambda: map(printable, _lines(learned, effects, terminal_width())),
+    )
     if weights and not arguments.write:
         note("--write writes the weights into contextdb.toml.")
     return ExitCode.FOUND if weights and not arguments.write else ExitCode.OK
@@ -94,7 +94,7 @@ def _sessions(files: list[str], project: str | None) -> tuple[str, list[ChoiceSe
 
 def _document(learned: Learned, effects: dict[str, WhatIf], is_better: bool, is_written: bool) -> dict[str, object]:
     sessions = [{"file": file, **effect.to_json()} for file, effect in effects.items()]
-    return {"format": 1, **learned.to_json(), "better": is_better, "written": is_better and is_written, "sessions": sessions}
+    return {**learned.to_json(), "better": is_better, "written": is_better and is_written, "sessions": sessions}
 
 
 def _lines(learned: Learned, effects: dict[str, WhatIf], width: int) -> Iterator[str]:

@@ -181,7 +181,6 @@ def _of(clips: Clips | None, trace: Trace | None, file: str) -> tuple[Mapping[st
 
 
 def _settings(arguments: argparse.Namespace, clips: Clips | None, trace: Trace | None) -> PoseSettings | None:
-    """How the poses of a session are made."""
     if clips is None:
         return None
     recorded = [] if trace is None else [str(about["controller"]) for about in trace.about.values() if "controller" in about]

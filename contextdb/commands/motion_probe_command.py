@@ -15,12 +15,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from contextdb.commands import answer
 from contextdb.commands.motion_measure_command import add_bars, gates_of
 from contextdb.commands.motion_run_command import character_of, say_where
 from contextdb.commands.motion_stage import Stage, context_text
 from contextdb.commands.numbers import number_type, rate_of
 from contextdb.compiled.table import CompiledTable
-from contextdb.console import ExitCode, aligned, note, output, progress
+from contextdb.console import ExitCode, aligned, note, progress
 from contextdb.disk import make_folder
 from contextdb.disk.boundary import inside
 from contextdb.errors import ContextDBError, Fault, FileError, Place, plural, some
@@ -28,7 +29,6 @@ from contextdb.motion import Character, Measures, Pose, Trace, measure
 from contextdb.motion.characters.drives import Drive, drives, steered
 from contextdb.motion.characters.probing import Plan, Scene, plan_of
 from contextdb.motion.trace.stats import ForcedBy, forced_by, together
-from contextdb.report.render_json import as_json
 
 _SPEED = number_type("a speed to drive at. Accepted: 0.1 to 100 m/s, such as 1.3.", 0.1, 100.0)
 KINDS = ("straight", "turns", "circle", "eight", "speeds", "stops")
@@ -97,11 +97,7 @@ def run(arguments: argparse.Namespace) -> ExitCode:
             trace.save(probe.file, timings=False)
         probes.append(probe)
     over = list(_over(probes, arguments))
-    with output():
-        if arguments.json:
-            print(as_json(_document(plan, probes)), end="")
-        else:
-            print("\n".join(_lines(probes)))
+    answer(arguments, lambda: _document(plan, probes), lambda: _lines(probes))
     note(*over)
     return ExitCode.FOUND if over else ExitCode.OK
 
@@ -165,7 +161,7 @@ def _document(plan: Plan, probes: Sequence[Probe]) -> dict[str, Any]:
         }
         for probe in probes
     ]
-    return {"format": 1, "contexts": plan.n_contexts, "left_open": list(plan.left_open), "sessions": sessions}
+    return {"contexts": plan.n_contexts, "left_open": list(plan.left_open), "sessions": sessions}
 
 
 def _lines(probes: Sequence[Probe]) -> Iterator[str]:

@@ -18,26 +18,26 @@ import json
 import os
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
-from contextdb.commands import add_page_arguments, take_page_arguments
+from contextdb.commands import add_page_arguments, answer, take_page_arguments
 from contextdb.commands.motion_build_command import MotionProject, warn
 from contextdb.commands.motion_page import Played, comment_of, page_file, rerun_file, write_page, write_rerun
 from contextdb.commands.motion_stage import add_view
-from contextdb.commands.motion_what_if import changes_of
 from contextdb.commands.numbers import number_of
 from contextdb.commands.progress import building_bar
 from contextdb.console import ExitCode, output, terminal_width
 from contextdb.disk import path_in_quotes, write_atomic
 from contextdb.disk.boundary import is_below, work_tree
-from contextdb.errors import ContextDBError, Fault, FileError, MotionError, Place, QueryError, in_quotes
+from contextdb.errors import ContextDBError, Fault, FileError, MotionError, Place, QueryError, in_quotes, nearest, some
 from contextdb.motion import MotionDatabase, open_or_build
 from contextdb.motion.measuring.measure import warped_poses
+from contextdb.motion.search.filters import Biases
 from contextdb.motion.selection.decision import Decision, Playing
 from contextdb.motion.storage.building import saved_path
 from contextdb.motion.storage.pose_files import saved_poses
@@ -53,7 +53,6 @@ from contextdb.motion.trace.stock import Stock
 from contextdb.motion.trace.views import NOTHING_FORCED, decision_lines, look_first, session_lines, summary_line
 from contextdb.motion.trace.what_if import what_if
 from contextdb.motion.trace.why_not import WhyNot
-from contextdb.report.render_json import as_json
 from contextdb.tables.project import SCHEMA_FILE, Project, folder_of
 
 Json = dict[str, object]
@@ -111,12 +110,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         parts.insert(0, _FullDecision.of(replay, place).part())
     if not parts:
         parts.append(_session(replay) if page is None else ({}, [summary_line(replay.trace.brief())]))
-    with output():
-        if arguments.json:
-            merged = {key: value for document, _ in parts for key, value in document.items()}
-            print(as_json({"format": 1, "file": arguments.file, **merged}), end="")
-        else:
-            print(*("\n".join(lines) for _, lines in parts), sep="\n\n")
+    merged = {"file": arguments.file} | {key: value for document, _ in parts for key, value in document.items()}
+    answer(arguments, lambda: merged, lambda: ["\n\n".join("\n".join(lines) for _, lines in parts)])
     return ExitCode.OK
 
 
@@ -377,3 +372,47 @@ def _saved(path: Path, about: Mapping[str, object]) -> MotionDatabase | None:
     except ContextDBError:
         return None
     return database if is_recorded(about, database) else None
+
+
+# ---- what `motion replay --what-if` changes: NAME=VALUE as weights of channels, biases of databases, and thresholds
+
+BIASES = ("base", "continuing", "looping")
+THRESHOLD = "threshold "
+ACCEPTED = 'NAME=VALUE, such as "LeftFoot velocity=2", "continuing=-0.1" or "threshold jog_tired=3"'
+MOST = 1e9
+
+
+def changes_of(texts: Sequence[str], databases: Mapping[str, MotionDatabase]) -> Changes:
+    """The changes that some texts mean. Raises QueryError for a text that is no NAME=VALUE, a name that there is not, with the
+    nearest, or a value that is no number."""
+    channels = list(dict.fromkeys(name for each in databases.values() for name in each.channel_names))
+    known = [*channels, *BIASES, *(f"{THRESHOLD}{name}" for name in databases)]
+    weights: dict[str, float] = {}
+    biases: dict[str, float] = {}
+    thresholds: dict[str, float | None] = {}
+    for text in texts:
+        name, value = _read(text, known)
+        if name in channels and value < 0.0:
+            raise QueryError(Fault(f"the weight of {in_quotes(name)} is {value:g}.", "a number, 0 or more"))
+        if name in channels:
+            weights[name] = value
+        elif name in BIASES:
+            biases[name] = value
+        else:
+            thresholds[name.removeprefix(THRESHOLD)] = value
+    of_each: dict[str, Biases] = {name: replace(each.biases, **biases) for name, each in databases.items()} if biases else {}
+    return {"weights": weights, "biases": of_each, "thresholds": thresholds}
+
+
+def _read(text: str, known: Sequence[str]) -> tuple[str, float]:
+    name, equals, number = (part.strip() for part in text.rpartition("="))
+    if not equals or not name:
+        raise QueryError(Fault(f"{in_quotes(text)} is not a change.", ACCEPTED))
+    if name not in known:
+        near = nearest(name, known)
+        fault = f"there is no channel, bias or threshold {in_quotes(name)}."
+        raise QueryError(Fault(fault, some(known), in_quotes(f"{near}={number}") if near else ""))
+    value = number_of(number)
+    if value is None or abs(value) > MOST:
+        raise QueryError(Fault(f"{in_quotes(number)} is not a number.", ACCEPTED))
+    return name, value

@@ -16,16 +16,16 @@ from dataclasses import replace
 import numpy as np
 
 from contextdb.cells.facts import Fact
+from contextdb.commands import answer
 from contextdb.commands.motion_stage import Stage, add_query_arguments, add_view, context_text
 from contextdb.compiled.matches import Matches
-from contextdb.console import ExitCode, output, printable, terminal_width
+from contextdb.console import ExitCode, printable, terminal_width
 from contextdb.errors import in_quotes, plural
 from contextdb.motion import MotionDatabase
 from contextdb.motion.features.extraction import Features
 from contextdb.motion.search.candidates import Candidates
 from contextdb.motion.trace.cost_views import Ranked, View, candidate_lines, candidates_json
 from contextdb.motion.trace.views import left_out_text
-from contextdb.report.render_json import as_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,12 +43,11 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     query = stage.query(arguments.query, [name], arguments)
     candidates = _candidates(stage.databases[name], query, valid.get(name), arguments)
     n_free = stage.databases[name].n_frames - sum(candidates.counts.values())
-    with output():
-        if arguments.json:
-            document = {"format": 1, "context": context_text(facts), "frames": n_free, **_document(stage, name, candidates)}
-            print(as_json(document), end="")
-        else:
-            print(*_lines(stage, name, candidates, facts, valid.get(name), n_free, arguments), sep="\n")
+    answer(
+        arguments,
+        lambda: {"context": context_text(facts), "frames": n_free, **_document(stage, name, candidates)},
+        lambda: _lines(stage, name, candidates, facts, valid.get(name), n_free, arguments),
+    )
     return ExitCode.OK if n_free else ExitCode.FOUND
 
 

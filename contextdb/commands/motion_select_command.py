@@ -11,15 +11,15 @@ from __future__ import annotations
 import argparse
 from dataclasses import replace
 
+from contextdb.commands import answer
 from contextdb.commands.motion_stage import Stage, add_query_arguments, add_view, context_text
-from contextdb.console import ExitCode, output, terminal_width
+from contextdb.console import ExitCode, terminal_width
 from contextdb.motion.markup.left_out import LeftOut
 from contextdb.motion.selection.controller import Controller
 from contextdb.motion.selection.decision import Decision
 from contextdb.motion.trace.cost_views import View, decision_json
 from contextdb.motion.trace.session import Trace
 from contextdb.motion.trace.views import decision_lines
-from contextdb.report.render_json import as_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,14 +42,12 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     decision = controller.update(0.0, query, valid or None, arguments.tags, context_text(facts))
     if not arguments.left_out:
         decision = _without_left_out(decision)
-    with output():
-        if arguments.json:
-            print(as_json({"format": 1, **decision_json(decision, trace.events(0))}), end="")
-        else:
-            lines = decision_lines(
-                decision, View(arguments.view), name=arguments.name, events=trace.events(0), width=terminal_width()
-            )
-            print(*lines, sep="\n")
+    events, view = trace.events(0), View(arguments.view)
+    answer(
+        arguments,
+        lambda: decision_json(decision, events),
+        lambda: decision_lines(decision, view, name=arguments.name, events=events, width=terminal_width()),
+    )
     return ExitCode.OK if decision.playing is not None else ExitCode.FOUND
 
 

@@ -19,12 +19,12 @@ from contextdb import bitmask
 from contextdb.cells.conditions import Condition
 from contextdb.cells.facts import UNKNOWN_MODES, Fact, no_condition, read_fact_text
 from contextdb.cells.output_types import OutputValue
-from contextdb.commands import missing_facts_by_option
+from contextdb.commands import answer, missing_facts_by_option
 from contextdb.commands.numbers import whole_type
 from contextdb.compiled.explain import Explanation, RowExplanation, describe_fact
 from contextdb.compiled.pick import Outcome
 from contextdb.compiled.table import CompiledTable, data_of
-from contextdb.console import ExitCode, aligned, output, printable, styled, terminal_width, wants_colour, width_of
+from contextdb.console import ExitCode, aligned, printable, styled, terminal_width, wants_colour, width_of
 from contextdb.errors import ContextError, Fault, in_quotes, plural
 from contextdb.tables.places import open_compiled
 
@@ -62,13 +62,8 @@ def run(arguments: argparse.Namespace) -> ExitCode:
     context = read_facts(plain, compiled)
     with missing_facts_by_option():
         explanation = compiled.explain(context, unknown=arguments.unknown, actors=actors, prefer=arguments.prefer)
-    with output():
-        if arguments.json:
-            from contextdb.report.render_json import as_json
-
-            print(as_json(_document(compiled, explanation, arguments.explain, arguments.most)), end="")
-        else:
-            print(*_lines(compiled, explanation, arguments.explain, arguments.most), sep="\n")
+    about = (compiled, explanation, arguments.explain, arguments.most)
+    answer(arguments, lambda: _document(*about), lambda: _lines(*about))
     return ExitCode.OK if explanation.matches else ExitCode.FOUND
 
 
@@ -152,7 +147,7 @@ def _document(compiled: CompiledTable, explanation: Explanation, explains: bool,
             )
         if (roles := explanation.roles(r)) is not None:
             rows[-1]["casting"] = roles
-    document: dict[str, object] = {"format": 1, "table": compiled.name, "context": context, "count": len(matches), "matches": rows}
+    document: dict[str, object] = {"table": compiled.name, "context": context, "count": len(matches), "matches": rows}
     if explains:
         document["explain"] = [_explained(r) for r in explanation.nearest(most)]
     return document

@@ -61,7 +61,6 @@ class ValueMasks:
         return [bitmask.to_int(m) for m in self.masks]
 
     def codes(self, fact: Value | None) -> tuple[int, ...]:
-        """The number of the fact's mask; None is a missing fact."""
         if fact is None:
             return (len(self.masks) - 1,)
         return (self.class_of.get(fact, len(self.values)),)
@@ -90,15 +89,12 @@ class NumberMasks:
 
     @cached_property
     def ints(self) -> list[int]:
-        """Every mask as a Python integer, the missing one last."""
         return [bitmask.to_int(m) for m in self.masks]
 
     def codes(self, fact: float | None) -> tuple[int, ...]:
-        """The number of the fact's mask; None is a missing fact."""
         return (len(self.masks) - 1 if fact is None else bisect_right(self.bound_list, fact),)
 
     def set_bits(self, accepts: sets.Accepted) -> tuple[int, int]:
-        """Rows that accept some, and rows that accept all, of a set of numbers."""
         assert isinstance(accepts, sets.NumberSet)
         return _some_and_all(self.ints, _classes_in(accepts, self.bound_list))
 
@@ -123,7 +119,6 @@ class WideMasks:
 
     @cached_property
     def bound_list(self) -> list[float]:
-        """The bounds as Python floats, to bisect in."""
         return [float(b) for b in self.bounds]
 
     @cached_property
@@ -154,7 +149,6 @@ class WideMasks:
         return bits
 
     def set_bits(self, accepts: sets.Accepted) -> tuple[int, int]:
-        """Rows that accept some, and rows that accept all, of a set of numbers."""
         assert isinstance(accepts, sets.NumberSet)
         held = [self.bits(k) for k in _classes_in(accepts, self.bound_list)]
         return reduce(or_, held), reduce(and_, held)
@@ -355,3 +349,38 @@ def _tag_masks(cells: Sequence[sets.Accepted | None], codes: Codes) -> TagMasks:
     masks ^= bitmask.full(len(codes))
     masks[2::3] = _any_rows(cells, codes)
     return TagMasks(len(codes), tags, tuple(c for _, c in negated), masks)
+
+
+# ---- the class of a number among a column's bounds, without bisection where the bounds lie well apart. The line is cut into
+# equal cells, so many that no three bounds share one: a cell "2..3" has a bound at 2, "1..2" one just above. A number's cell
+# says how many bounds are below its cell, and two comparisons say the rest: exact, because which cell a number is in never
+# falls as the number grows
+
+Doubles = NDArray[np.float64]
+MOST_CELLS = 1 << 13
+
+
+NumberCells = tuple[Doubles, float, float, NDArray[np.int32]]
+"""Bounds float64 [K - 1], ascending, and two NaN behind them; the first bound; how many cells a unit has; for each cell int32 how
+many bounds lie in earlier ones. Class k holds the x with bounds[k - 1] <= x < bounds[k]."""
+
+
+def number_cells(bounds: Doubles) -> NumberCells | None:
+    """The fewest cells of which none has three bounds; None where bisection is needed."""
+    n_cells = 64
+    while len(bounds) > 1 and n_cells <= MOST_CELLS:
+        with np.errstate(over="ignore"):
+            scale = (n_cells - 1) / (bounds[-1] - bounds[0])
+        cells = _cells_of(bounds, bounds[0], scale, n_cells)
+        if scale > 0.0 and np.isfinite(scale) and (cells[2:] > cells[:-2]).all():
+            before = np.searchsorted(cells, np.arange(n_cells)).astype(np.int32)
+            return np.append(bounds, [np.nan, np.nan]), float(bounds[0]), float(scale), before
+        n_cells *= 2
+    return None
+
+
+def _cells_of(numbers: Doubles, low: float, scale: float, n_cells: int) -> NDArray[np.int32]:
+    """The cell of each number, as the core finds it; those beyond the ends are in the first and the last."""
+    with np.errstate(all="ignore"):
+        cells: NDArray[np.int32] = np.minimum(np.maximum((numbers - low) * scale, 0.0), n_cells - 1.0).astype(np.int32)
+    return cells

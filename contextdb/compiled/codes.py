@@ -64,7 +64,6 @@ class CodeSlots:
         return Batch(self._n_rows, _words(self._enabled), tuple(plain), tuple(wide))
 
     def ignored(self, at: int) -> int:
-        """The code of a fact of a column that is ignored."""
         return -1 if isinstance(self.columns[at], WideMasks) else 0
 
 

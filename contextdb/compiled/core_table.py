@@ -164,7 +164,6 @@ def _array(array: Any, dtype: type) -> Any:
 
 
 def _texts(parts: object) -> Iterable[str]:
-    """All texts in tuples of tuples."""
     if isinstance(parts, str):
         yield parts
     elif isinstance(parts, tuple):

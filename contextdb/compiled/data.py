@@ -30,13 +30,12 @@ from contextdb.cells.mirroring import changed_in_mirror, frozen_facts, in_mirror
 from contextdb.cells.notebook import one_line
 from contextdb.cells.sets import ANY, Cell
 from contextdb.columns import TextColumn
-from contextdb.compiled.classes import ColumnMasks, NumberMasks, WideMasks
+from contextdb.compiled.classes import ColumnMasks, NumberCells, NumberMasks, WideMasks, number_cells
 from contextdb.compiled.codes import CodeSlots
 from contextdb.compiled.core_table import UNKNOWN, core_table
 from contextdb.compiled.layers import SoftMasks, bits_of, nbytes
 from contextdb.compiled.matches import Answering, Matches, with_mirrored, with_penalties, with_widened
 from contextdb.compiled.memory import Memory
-from contextdb.compiled.number_cells import NumberCells, number_cells
 from contextdb.compiled.outputs import NO_OUTPUTS, Outputs
 from contextdb.compiled.pick_columns import NOTHING, PickColumns
 from contextdb.compiled.unchanging import Unchanging
@@ -286,7 +285,6 @@ class CompiledData(Unchanging):
 
     @cached_property
     def is_soft(self) -> bool:
-        """Whether the table has soft cells."""
         return any(self.soft)
 
     @cached_property
@@ -380,7 +378,6 @@ class CompiledData(Unchanging):
 
     @cached_property
     def codes(self) -> CodeSlots:
-        """Which codes the facts of a context have."""
         return CodeSlots(self.masks, self.enabled, self.n_rows)
 
     @cached_property
@@ -435,7 +432,6 @@ class CompiledData(Unchanging):
 
     @cached_property
     def core(self) -> Table:
-        """The table as the core has it."""
         columns = list(zip(self.conditions, self.masks, strict=True))
         core = core_table(columns, self.enabled, self.answering, self.derivation, self.when, self.soft)
         core.is_watched = self._watcher is not None

@@ -136,7 +136,6 @@ class Growth:
 
     @property
     def arrays(self) -> tuple[NDArray[Any], ...]:
-        """As the core takes them."""
         return self.per, self.starts, self.ends, self.which
 
     def steps(self, fact: Fact) -> Floats:

@@ -287,7 +287,6 @@ class FewerMatches(ManyMatches):
 
     @cached_property
     def mirrored(self) -> ManyMatches:
-        """The valid rows of the same contexts with mirrored facts, without the same rows."""
         return FewerMatches(self.whole.mirrored, self.others) if self.compiled.mirroring else self
 
     @cached_property
@@ -325,7 +324,6 @@ class JoinedMatches(ManyMatches):
 
     @cached_property
     def mirrored(self) -> ManyMatches:
-        """The answers with mirrored facts, joined in the same way."""
         return JoinedMatches(self.first.mirrored, self.second.mirrored, self.join) if self.compiled.mirroring else self
 
     @cached_property

@@ -444,7 +444,6 @@ def _costs_of_both(first: Matches, second: Matches) -> NDArray[np.float64]:
 
 
 def _state(matches: Matches) -> dict[str, Any]:
-    """All that an answer holds, by name."""
     own: dict[str, Any] = (object.__getstate__(matches) or (None, {}))[1]  # type: ignore[index]
     return own | {"bits": matches.bits, "_table": matches._table}
 

@@ -115,7 +115,7 @@ class Outputs(Unchanging, Mapping[str, Column]):
 
     @cached_property
     def plays(self) -> NDArray[np.float64] | None:
-        """How each row plays, and last what plays without a row: float64 [R + 1, 8], see `contextdb.cells.row_play`; None where no
+        """How each row plays, and last what plays without a row: float64 [R + 1, 8], see `contextdb.cells.outputs`; None where no
         reserved output is declared."""
         reserved = [output for output in self.declared if output.is_reserved]
         if not reserved:

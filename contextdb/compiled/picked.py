@@ -59,7 +59,6 @@ class Picked:
 
     @property
     def arrays(self) -> PickedArrays:
-        """What the core takes."""
         return self.turns, self.recent, self.rests, self.rest_turns, self.rest_s
 
     def make_room(self, n_more: int) -> None:

@@ -357,7 +357,6 @@ class CompiledTable(Unchanging):
 
 
 def _facts_by_name(method: str, slips: Mapping[str, object]) -> WrongType:
-    """The error for facts that are given as arguments by name."""
     first = next(iter(slips))
     problem = f"{method} is given {in_quotes(first)} as an argument."
     accepted = "the facts as one mapping"

@@ -601,7 +601,7 @@ def read_column(
 ) -> int | None:
     """Put the codes of the facts of condition `at` into int32 [slots, N], `first` that of its first mask; gives how many facts are
     missing. A column is a list or tuple, an array of numpy's, or a capsule with an Arrow stream. None where the careful way must
-    read it: a fact is not plainly of its type. `cells` are those of `contextdb.compiled.number_cells`, for numbers."""
+    read it: a fact is not plainly of its type. `cells` are those of `contextdb.compiled.classes`, for numbers."""
 
 Field = tuple[int, int, int, int]
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from contextdb.covering.engine import coverage
 from contextdb.covering.pairs import PairTable, Slice, pairs
 from contextdb.covering.progress import Cancelled
-from contextdb.covering.report import CoverageReport, Crowd, Gap, Nearest, Overlap
-from contextdb.covering.shares import format_percent
+from contextdb.covering.report import CoverageReport, Crowd, Gap, Nearest, Overlap, format_percent
 
 __all__ = ["Cancelled", "CoverageReport", "Crowd", "Gap", "Nearest", "Overlap", "PairTable", "Slice", "coverage"]
 __all__ += ["format_percent", "pairs"]

@@ -27,11 +27,10 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.covering.count import Bounds, uncovered_share
-from contextdb.covering.moments import Moment, Moments
+from contextdb.covering.moments import Moment, Moments, Preferred
 from contextdb.covering.points import PointFinder
-from contextdb.covering.preferred import Preferred
+from contextdb.covering.report import wilson
 from contextdb.covering.sample import CHUNK, Sampler
-from contextdb.covering.shares import wilson
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import OutOfSteps, Point
 from contextdb.schema.contracts import Contract

@@ -24,13 +24,12 @@ from contextdb.covering.assumed import Opened, assumptions_of, not_boxed, opened
 from contextdb.covering.contract_shares import Demand, Drawn, Part, Shares
 from contextdb.covering.draw import Drawer
 from contextdb.covering.gaps import widened
-from contextdb.covering.moments import Moment, Moments
+from contextdb.covering.moments import Moment, Moments, Preferred
 from contextdb.covering.numbered import NumberedBoxes
 from contextdb.covering.points import PointFinder, slabs
-from contextdb.covering.preferred import Preferred
 from contextdb.covering.progress import Progress, Stops, Tell
+from contextdb.covering.report import distinct_percents
 from contextdb.covering.ruled import without_rules
-from contextdb.covering.shares import distinct_percents
 from contextdb.covering.space import Box, Space
 from contextdb.covering.witness import OutOfSteps, Point
 from contextdb.errors import ContextDBError
@@ -216,7 +215,6 @@ class _Prover:
         return NumberedBoxes.of(self.space.full, outside)
 
     def _around(self, point: Point) -> Box:
-        """A box of counterexamples round one."""
         for part in self.demand.parts():
             within, avoided = part
             is_within = all(side >> k & 1 for side, k in zip(within, point, strict=True))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from contextdb import bitmask
 from contextdb.core import Boxes
+from contextdb.covering.factors import heads
 from contextdb.covering.progress import SILENT, Progress
 from contextdb.covering.space import Box, Sides, Space
 from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
@@ -56,7 +57,6 @@ class Bounds:
 
     @property
     def is_exact(self) -> bool:
-        """Whether the share is known."""
         return self.lower == self.upper
 
 
@@ -130,24 +130,13 @@ def _product(
 
 def _independent(boxes: Sequence[Sides]) -> list[tuple[list[int], list[Sides]]]:
     """The boxes in groups that share no factor, each with its factors, ascending."""
-    group = {f: f for f in sorted({f for box in boxes for f in box})}
-
-    def head(f: int) -> int:
-        while group[f] != f:
-            group[f] = group[group[f]]
-            f = group[f]
-        return f
-
-    for box in boxes:
-        first, *others = box
-        for f in others:
-            group[head(f)] = head(first)
+    head_of = heads(sorted({f for box in boxes for f in box}), boxes)
     factors: dict[int, list[int]] = {}
-    for f in group:
-        factors.setdefault(head(f), []).append(f)
+    for f, head in head_of.items():
+        factors.setdefault(head, []).append(f)
     members: dict[int, list[Sides]] = {}
     for box in boxes:
-        members.setdefault(head(next(iter(box))), []).append(box)
+        members.setdefault(head_of[next(iter(box))], []).append(box)
     return [(factors[one], members_of) for one, members_of in members.items()]
 
 

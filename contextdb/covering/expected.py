@@ -15,10 +15,9 @@ from contextdb.covering.assumed import Opened, opened
 from contextdb.covering.engine import SAMPLES, WORK, Covered, counted
 from contextdb.covering.gaps import described
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.covering.report import Gap
-from contextdb.covering.shares import distinct_percents, format_percent
+from contextdb.covering.report import Gap, distinct_percents, format_percent
 from contextdb.covering.space import Box
-from contextdb.covering.witness import BoxSet, OutOfSteps, Steps
+from contextdb.covering.witness import BoxSet, Steps
 from contextdb.errors import Fault, TableError, plural
 from contextdb.tables.expected_file import Situation
 from contextdb.tables.table import EitherTable
@@ -99,7 +98,6 @@ class Expectation:
         return sorted(items, key=lambda item: -item.share)
 
     def to_json(self) -> dict[str, object]:
-        """The coverage as plain data."""
         covered = self.covered
         return {
             "file": self.file,
@@ -140,7 +138,8 @@ def expectation(
         progress.at(at / n)
         ready = opened(table, list(_outside(situation.parsed, domains)))
         box = ready.space.box(situation.parsed)
-        if box is None or not _can_happen(ready, box):
+        impossible = BoxSet.of(ready.space.full, ready.space.impossible)
+        if box is None or impossible.hold(box, Steps(STEPS), False):
             faults.append(Fault("the situation cannot happen: the table assumes that it does not.", place=situation.place))
             continue
         measured.append(_measured(ready, situation, box, seed, own_work, own_samples))
@@ -153,15 +152,6 @@ def _outside(cells: Mapping[str, Cell], domains: Mapping[str, Domain]) -> Iterat
     """The contexts that are not in a box of cells, as boxes."""
     for name, cell in cells.items():
         yield {name: Cell(complement(cell.accepts, domains[name]))}
-
-
-def _can_happen(ready: Opened, box: Box) -> bool:
-    """Whether some context of a box is not impossible; taken for granted where that is too much work to find out."""
-    impossible = BoxSet.of(ready.space.full, ready.space.impossible)
-    try:
-        return impossible.outside(impossible.all, box, Steps(STEPS)) is not None
-    except OutOfSteps:
-        return True
 
 
 def _measured(ready: Opened, situation: Situation, box: Box, seed: int, work: int, samples: int) -> Measured:

@@ -16,11 +16,12 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, reduce
-from itertools import compress
+from itertools import compress, pairwise
 from operator import and_
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -195,33 +196,40 @@ class TagFactor:
 
 
 Factor = ValueFactor | NumberFactor | TagFactor
+Name = TypeVar("Name", bound=Hashable)
+
+
+def heads(names: Iterable[Name], joined: Iterable[Iterable[Name]]) -> dict[Name, Name]:
+    """For each name one of its group, the same for all of the group; names that are joined are of one group."""
+    group = {name: name for name in names}
+
+    def head(name: Name) -> Name:
+        while group[name] != name:
+            group[name] = group[group[name]]
+            name = group[name]
+        return name
+
+    for members in joined:
+        for one, other in pairwise(members):
+            group[head(other)] = head(one)
+    return {name: head(name) for name in group}
 
 
 def tag_factors(accepted: Sequence[Accepted], domain: Domain) -> list[TagFactor]:
     """A factor for each group of tags that hang together: one above the other, or in one cell that begins with "not"."""
     sets = [a for a in accepted if isinstance(a, TagSet) and not a.is_empty]
-    tags = sorted({t for s in sets for t in s.needs | s.bans})
-    group = {t: t for t in tags}
-
-    def head(tag: str) -> str:
-        while group[tag] != tag:
-            group[tag] = group[group[tag]]
-            tag = group[tag]
-        return tag
-
+    named = {t for s in sets for t in s.needs | s.bans}
+    tags = sorted(named)
     declared = domain.values if domain.values is not None else tags
-    over = {tag: [t for t in tags_above(tag) if t in group] for tag in dict.fromkeys((*tags, *declared))}
-    negated = (sorted(s.needs | s.bans) for s in sets if s.is_complement)
-    for members in (*over.values(), *negated):
-        for one in members[1:]:
-            group[head(one)] = head(members[0])
+    over = {tag: [t for t in tags_above(tag) if t in named] for tag in dict.fromkeys((*tags, *declared))}
+    head_of = heads(tags, (*over.values(), *(sorted(s.needs | s.bans) for s in sets if s.is_complement)))
     members_of: dict[str, list[str]] = {}
     for tag in tags:
-        members_of.setdefault(head(tag), []).append(tag)
+        members_of.setdefault(head_of[tag], []).append(tag)
     declared_of: dict[str, list[str]] = {}
     for tag in declared:
         if over[tag]:
-            declared_of.setdefault(head(over[tag][0]), []).append(tag)
+            declared_of.setdefault(head_of[over[tag][0]], []).append(tag)
     return [TagFactor.of(members, declared_of.get(one, ())) for one, members in members_of.items()]
 
 

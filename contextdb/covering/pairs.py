@@ -31,8 +31,8 @@ from contextdb.compiled.table import CompiledTable
 from contextdb.covering.assumed import opened
 from contextdb.covering.factors import TagFactor, ValueFactor
 from contextdb.covering.progress import Progress, Stops, Tell
+from contextdb.covering.report import wilson
 from contextdb.covering.sample import Codes, Sampler, samples_of
-from contextdb.covering.shares import wilson
 from contextdb.covering.space import CellBox, Sides, Space, WeightsOf, require_counts
 from contextdb.errors import plural
 from contextdb.tables.table import EitherTable
@@ -143,7 +143,6 @@ class PairTable:
         return sum(s.is_named for s in slices) / len(slices) if slices else 1.0
 
     def pairs(self) -> Iterator[tuple[int, int]]:
-        """Every pair of two conditions, by number."""
         return ((i, j) for i in range(len(self.conditions)) for j in range(i + 1, len(self.conditions)))
 
     def to_json(self) -> dict[str, object]:

@@ -23,7 +23,7 @@ from contextdb.core import count_holders
 from contextdb.covering.draw import Drawer
 from contextdb.covering.numbered import NumberedBoxes
 from contextdb.covering.progress import SILENT, Progress
-from contextdb.covering.shares import wilson
+from contextdb.covering.report import wilson
 from contextdb.covering.space import Sides, Space
 from contextdb.covering.witness import Point
 

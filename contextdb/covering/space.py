@@ -144,7 +144,6 @@ class Space:
         )
 
     def first(self, n_boxes: int) -> Space:
-        """The same space with the first boxes only."""
         left = self.n_left + max(0, len(self.boxes) - n_boxes)
         return replace(self, rows=self.rows[:n_boxes], boxes=self.boxes[:n_boxes], n_left=left)
 

@@ -97,7 +97,6 @@ class BoxSet:
         return cls(full, rejects, restricts, len(boxes))
 
     def add(self, box: Box) -> None:
-        """One more box, with the next bit."""
         bit = 1 << self.n_boxes
         self.n_boxes += 1
         for f in compress(range(len(box)), map(ne, box, self.full)):
@@ -147,8 +146,14 @@ class BoxSet:
         for f, side in enumerate(within):
             if open_boxes and side != self.full[f]:
                 open_boxes &= self.meeting(f, side)
-        point = self._search(open_boxes, within, list(range(len(within))), steps)
-        return None if point is None else _completed(point, list(map(_first, within)))
+        return next(self._contexts(open_boxes, within, steps), None)
+
+    def hold(self, box: Box, steps: Steps, otherwise: bool) -> bool:
+        """Whether every context of a box is in one of these; `otherwise` where the steps are used up before that is known."""
+        try:
+            return self.outside(self.all, box, steps) is None
+        except OutOfSteps:
+            return otherwise
 
     def points(self, within: Box, steps: Steps) -> Iterator[Point]:
         """Contexts of `within` that are in no box, one after the other, until there is none.
@@ -160,9 +165,13 @@ class BoxSet:
         for f, side in enumerate(within):
             if side != self.full[f]:
                 open_boxes &= self.meeting(f, side)
-        firsts = list(map(_first, within))
-        for point in self._points(open_boxes, within, list(range(len(within))), steps):
-            yield _completed(point, firsts)
+        yield from self._contexts(open_boxes, within, steps)
+
+    def _contexts(self, open_boxes: int, within: Box, steps: Steps) -> Iterator[Point]:
+        """The contexts of `within` that a search meets, of the factors that it leaves open the first class."""
+        firsts = [(side & -side).bit_length() - 1 for side in within]
+        for fixed in self._points(open_boxes, within, list(range(len(within))), steps):
+            yield tuple(fixed.get(f, first) for f, first in enumerate(firsts))
 
     def _points(self, open_boxes: int, within: Box, free: list[int], steps: Steps) -> Iterator[dict[int, int]]:
         fixed: dict[int, int] = {}
@@ -198,27 +207,12 @@ class BoxSet:
 
     def _open_now(self, open_boxes: int, known: int, fixed: dict[int, int]) -> int:
         """Open boxes, and those of the boxes from number `known` on that hold what is fixed."""
+        if known == self.n_boxes:
+            return open_boxes
         added = (self.all >> known) << known
         for f, k in fixed.items():
             added &= ~self.rejects[f][k]
         return open_boxes | added
-
-    def _search(self, open_boxes: int, within: Box, free: list[int], steps: Steps) -> dict[int, int] | None:
-        chosen: dict[int, int] = {}
-        path: list[tuple[int, list[int], list[tuple[int, int]]]] = []
-        while open_boxes:
-            steps.take(len(free))
-            factor = self._next_factor(open_boxes, within, free)
-            if factor is not None:
-                path.append((factor, free, self._choices(open_boxes, factor, within[factor])))
-            while path and not path[-1][2]:
-                chosen.pop(path.pop()[0], None)
-            if not path:
-                return None
-            factor, free, left = path[-1]
-            open_boxes, chosen[factor] = left.pop(0)
-            free = [f for f in free if f != factor]
-        return chosen
 
     def _next_factor(self, open_boxes: int, within: Box, free: list[int]) -> int | None:
         """The factor to fix: of a box that has only that one left, else the one that most boxes restrict; None when some box has
@@ -256,15 +250,3 @@ class BoxSet:
             if not any(fewer & ~bits == 0 for fewer, _ in best):
                 best.append((bits, k))
         return best
-
-
-def _completed(point: dict[int, int], firsts: Sequence[int]) -> Point:
-    """The classes of a point, of the factors that it leaves open the first."""
-    filled = list(firsts)
-    for f, k in point.items():
-        filled[f] = k
-    return tuple(filled)
-
-
-def _first(side: int) -> int:
-    return (side & -side).bit_length() - 1

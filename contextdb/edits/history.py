@@ -79,12 +79,10 @@ class History:
 
     @property
     def can_undo(self) -> bool:
-        """Whether there is an edit to take back."""
         return self.position > 0
 
     @property
     def can_redo(self) -> bool:
-        """Whether there is an edit that was taken back."""
         return self.position < len(self._edits)
 
     @property
@@ -94,12 +92,10 @@ class History:
 
     @property
     def undo_name(self) -> str | None:
-        """What `undo` would take back."""
         return self._edits[self.position - 1].name if self.can_undo else None
 
     @property
     def redo_name(self) -> str | None:
-        """What `redo` would make again."""
         return self._edits[self.position].name if self.can_redo else None
 
     @property

@@ -52,7 +52,6 @@ class TableFile:
     """The file of the contexts that are expected, where there is one."""
 
     def has_condition(self, condition: str) -> bool:
-        """Whether the table has a column that is this condition."""
         return condition not in plain_names(self.settings, self.columns) and any(c.name == condition for c in self.columns)
 
     @property

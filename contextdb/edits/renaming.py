@@ -29,7 +29,7 @@ from contextdb.disk.together import putting_back
 from contextdb.edits.project_files import NO_NAMES, ProjectFiles, Rewrite, TableFile
 from contextdb.edits.schema_file import require_declared_here
 from contextdb.errors import ContextDBError, Fault, FileError, Place, SchemaError, TableError, in_quotes, plural
-from contextdb.expressions.names import names_in, with_names
+from contextdb.expressions.tokens import names_in, with_names
 from contextdb.files.texts import AnySource, read_texts, written_over
 from contextdb.tables.gap_work import GapWork, gaps_path, key_of
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path

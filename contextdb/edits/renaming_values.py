@@ -20,8 +20,7 @@ from contextdb.edits.project_files import ProjectFiles, Rewrite, TableFile
 from contextdb.edits.renaming import Renaming, extending, rewritten, rewritten_contexts, rewritten_gaps, with_texts
 from contextdb.edits.schema_file import require_declared_here
 from contextdb.errors import ContextDBError, Fault, SchemaError, in_quotes, plural
-from contextdb.expressions.names import names_in
-from contextdb.expressions.tokens import Refusal, tokens_of
+from contextdb.expressions.tokens import Refusal, names_in, tokens_of
 from contextdb.files.texts import read_texts
 from contextdb.schema.settings import Schema
 from contextdb.tables.other_files import CASE_COLUMNS, cases_path

@@ -25,8 +25,7 @@ from contextdb.columns import TextColumn
 from contextdb.errors import Fault, Place, TableError, in_quotes, no_such, plural, safe_text, some
 from contextdb.exchange.delimited import decoded
 from contextdb.exchange.dmn_types import InputType, Types, children_of, domain_of, tag_of, text_of
-from contextdb.exchange.feel import cell_of, strings_of, value_of
-from contextdb.exchange.feel_rules import rule_of
+from contextdb.exchange.feel import cell_of, rule_of, strings_of, value_of
 from contextdb.exchange.proposals import propose_type
 from contextdb.exchange.reading import Reading, Remark, capped, listed, require_no_conflicts
 from contextdb.expressions.rules import check_rule

@@ -23,7 +23,7 @@ from contextdb.cells.grammar import format_cell
 from contextdb.cells.intervals import wrap_angle
 from contextdb.cells.sets import Accepted, Cell, NumberSet, TagSet, ValueSet
 from contextdb.columns import TextColumn
-from contextdb.covering.shares import wilson
+from contextdb.covering.report import wilson
 from contextdb.errors import ContextError, Fault, Place, TableError
 from contextdb.exchange.learned_boxes import Feature, Ints, LearnedBox, learned_boxes
 from contextdb.exchange.mapping import Mapped

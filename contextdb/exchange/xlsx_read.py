@@ -19,8 +19,7 @@ from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes
 from contextdb.exchange.grid import Block, Columns, column_letters, columns_of, parse_block
 from contextdb.exchange.mapping import FIRST_LINE, TYPES_SHEET
 from contextdb.exchange.reading import DATES, ERRORS, Reading, Remark, SheetWanted, capped, listed, text_of_value
-from contextdb.exchange.xlsx_people import comments_and_fills
-from contextdb.exchange.xlsx_scan import Marks, is_old, marks_of, require_workbook
+from contextdb.exchange.xlsx_scan import Marks, comments_and_fills, is_old, marks_of, require_workbook
 from contextdb.schema.settings import EMPTY, Schema, read_schema
 
 _TEXT = {str}

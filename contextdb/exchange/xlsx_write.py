@@ -26,7 +26,7 @@ from contextdb.edits.notes import NO_NOTES, Notes
 from contextdb.errors import Fault, Place, TableError, in_quotes, plural
 from contextdb.exchange.grid import column_letters
 from contextdb.exchange.mapping import TYPES_SHEET, described
-from contextdb.exchange.xlsx_people import FILLS
+from contextdb.exchange.xlsx_scan import FILLS
 from contextdb.tables.table import Table
 
 MOST_ROWS, MOST_COLUMNS, MOST_CHARACTERS, MOST_OF_NAME = 1_048_576, 16_384, 32_767, 31

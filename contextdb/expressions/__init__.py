@@ -25,8 +25,7 @@ from contextdb.expressions.assume import Assumptions, assumption_faults, constan
 from contextdb.expressions.boxes import Box
 from contextdb.expressions.derived import Derivation, derivation_faults, derive
 from contextdb.expressions.expression import Expression, read_expression
-from contextdb.expressions.names import names_in, with_names
-from contextdb.expressions.tokens import ExpressionError, ExpressionFault
+from contextdb.expressions.tokens import ExpressionError, ExpressionFault, names_in, with_names
 
 __all__ = ["Assumptions", "Box", "Derivation", "Expression", "ExpressionError", "ExpressionFault", "assumption_faults"]
 __all__ += ["constant_truth", "derivation_faults", "derive", "names_in", "read_assumptions", "read_expression", "with_names"]

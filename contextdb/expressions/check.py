@@ -7,7 +7,6 @@ can work with. Parts without facts are computed here, once; one that would alway
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import singledispatchmethod
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import ANGLE, BOOL, INT, NUMBER, TEXT
@@ -50,25 +49,50 @@ class Checker:
         self.names: list[str] = []
         """The conditions it is about, in the order of their first mention."""
 
-    @singledispatchmethod
     def check(self, node: Node) -> Checked:
         """The plan and the type of a node. Raises Refusal where the node does not fit the conditions."""
+        match node:
+            case Number(value=value):
+                return Const(value), Type(INT.type if value.is_integer() else NUMBER.type)
+            case Text(value=value):
+                return Const(value), Type(TEXT.type, frozenset((value,)))
+            case Truth(value=value):
+                return Const(value), _TRUTH
+            case Name():
+                return self._name(node)
+            case Unary():
+                return self._unary(node)
+            case Arithmetic():
+                return self._power(node) if node.sign == "**" else self._arithmetic(node)
+            case Call():
+                return self._literal(node, SPELT[node.name]) if node.name in SPELT else self._call(node)
+            case LogicNode():
+                plans = [self._truth(operand, in_quotes(node.word)) for operand in node.operands]
+                return self._folded(node, Logic(node.word, tuple(plans))), _TRUTH
+            case Comparison():
+                return self._comparison(node)
+            case Membership():
+                item = self.check(node.item)
+                choices = node.choices if isinstance(node.choices, tuple) else (node.choices,)
+                held = holding(node, item, [(choice, *self.check(choice)) for choice in choices], self.conditions)
+                return self._folded(node, Negation(held) if node.is_negated else held), _TRUTH
+            case Likeness():
+                held = matching(node, self.check(node.item)[0], self.conditions)
+                return self._folded(node, Negation(held) if node.is_negated else held), _TRUTH
+            case Conditional():
+                return self._conditional(node)
         raise AssertionError(node)
 
-    @check.register
-    def _check_number(self, node: Number) -> Checked:
-        return Const(node.value), Type(INT.type if node.value.is_integer() else NUMBER.type)
+    def _truth(self, node: Node, word: str) -> Part:
+        """The plan of a truth that a word takes."""
+        plan, node_type = self.check(node)
+        if node_type.kind.is_truth:
+            return plan
+        meant = {0.0: "False", 1.0: "True"}.get(node.value) if isinstance(node, Number) else None
+        accepted = 'True or False: a bool, a comparison such as speed > 0, or such as "InAir" in Tags'
+        raise Refusal(node.start, node.stop, f"{word} takes True or False, and this is {node_type.kind.value}", accepted, meant)
 
-    @check.register
-    def _check_text(self, node: Text) -> Checked:
-        return Const(node.value), Type(TEXT.type, frozenset((node.value,)))
-
-    @check.register
-    def _check_truth(self, node: Truth) -> Checked:
-        return Const(node.value), _TRUTH
-
-    @check.register
-    def _check_name(self, node: Name) -> Checked:
+    def _name(self, node: Name) -> Checked:
         condition = self.conditions.get(node.name)
         if condition is None:
             raise self._no_condition(node)
@@ -79,21 +103,16 @@ class Checker:
         values = domain.known if domain.type.needs_values else None
         return Given(node.name, domain.type), Type(domain.type, values, unit)
 
-    @check.register
-    def _check_unary(self, node: Unary) -> Checked:
-        part, part_type = self.check(node.part)
+    def _unary(self, node: Unary) -> Checked:
         if node.sign == "not":
-            self._need_truth(node.part, part_type, '"not"')
-            return self._folded(node, Negation(part)), _TRUTH
+            return self._folded(node, Negation(self._truth(node.part, '"not"'))), _TRUTH
+        part, part_type = self.check(node.part)
         self._need_number(node.part, part_type, in_quotes(node.sign))
         kind = INT.type if part_type.kind.is_whole else NUMBER.type
         plan = part if node.sign == "+" else self._folded(node, Apply(NEGATIVE, (part,)))
         return plan, Type(kind, None, part_type.unit)
 
-    @check.register
-    def _check_arithmetic(self, node: Arithmetic) -> Checked:
-        if node.sign == "**":
-            return self._power(node)
+    def _arithmetic(self, node: Arithmetic) -> Checked:
         function = OPERATORS[node.sign]
         parts = [self.check(part) for part in node.parts]
         for part, (_, part_type) in zip(node.parts, parts, strict=True):
@@ -102,10 +121,7 @@ class Checker:
             raise Refusal(node.right.start, node.right.stop, "nothing can be divided by 0", "a divisor that is not always 0")
         return self._applied(node, function, parts)
 
-    @check.register
-    def _check_call(self, node: Call) -> Checked:
-        if node.name in SPELT:
-            return self._literal(node, SPELT[node.name])
+    def _call(self, node: Call) -> Checked:
         function = FUNCTIONS.get(node.name)
         if function is None:
             raise self._no_function(node)
@@ -125,40 +141,15 @@ class Checker:
             raise Refusal(node.start, node.stop, f"{in_quotes(kind.name)} takes one text in quotes", kind.result)
         return spelt(text, kind)
 
-    @check.register
-    def _check_logic(self, node: LogicNode) -> Checked:
-        plans = []
-        for operand in node.operands:
-            plan, part_type = self.check(operand)
-            self._need_truth(operand, part_type, in_quotes(node.word))
-            plans.append(plan)
-        return self._folded(node, Logic(node.word, tuple(plans))), _TRUTH
-
-    @check.register
-    def _check_comparison(self, node: Comparison) -> Checked:
+    def _comparison(self, node: Comparison) -> Checked:
         parts = spelt_alike([(part, *self.check(part)) for part in node.operands])
         links = []
         for i, sign in enumerate(node.signs):
             links.append(self._link(sign, node.operands[i], parts[i], node.operands[i + 1], parts[i + 1]))
         return self._folded(node, Compare(tuple(plan for plan, _ in parts), tuple(links))), _TRUTH
 
-    @check.register
-    def _check_membership(self, node: Membership) -> Checked:
-        item = self.check(node.item)
-        choices = node.choices if isinstance(node.choices, tuple) else (node.choices,)
-        held = holding(node, item, [(choice, *self.check(choice)) for choice in choices], self.conditions)
-        return self._folded(node, Negation(held) if node.is_negated else held), _TRUTH
-
-    @check.register
-    def _check_likeness(self, node: Likeness) -> Checked:
-        plan, _ = self.check(node.item)
-        held = matching(node, plan, self.conditions)
-        return self._folded(node, Negation(held) if node.is_negated else held), _TRUTH
-
-    @check.register
-    def _check_conditional(self, node: Conditional) -> Checked:
-        condition, part_type = self.check(node.condition)
-        self._need_truth(node.condition, part_type, '"if"')
+    def _conditional(self, node: Conditional) -> Checked:
+        condition = self._truth(node.condition, '"if"')
         (then, a), (otherwise, b) = self.check(node.then), self.check(node.otherwise)
         kind = _common_kind(a, b)
         if kind is None:
@@ -202,15 +193,6 @@ class Checker:
         elif isinstance(node, Text) and node.value in self.conditions:
             meant = written_name(node.value)
         raise Refusal(node.start, node.stop, f"{role} takes numbers, and this is {node_type.kind.value}", "a number", meant)
-
-    def _need_truth(self, node: Node, node_type: Type, role: str) -> None:
-        if node_type.kind.is_truth:
-            return
-        meant = {Number: {0.0: "False", 1.0: "True"}.get(node.value)} if isinstance(node, Number) else {}
-        accepted = 'True or False: a bool, a comparison such as speed > 0, or such as "InAir" in Tags'
-        raise Refusal(
-            node.start, node.stop, f"{role} takes True or False, and this is {node_type.kind.value}", accepted, meant.get(Number)
-        )
 
     def _common_unit(self, node: Node, types: list[Type]) -> str | None:
         units = list(dict.fromkeys(t.unit for t in types if t.unit))

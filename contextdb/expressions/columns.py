@@ -14,7 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import singledispatch
+from functools import reduce
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -195,35 +196,29 @@ def _concatenated(blocks: Sequence[Column]) -> Column:
     return np.concatenate([b for b in blocks if not isinstance(b, Coded)])
 
 
-@singledispatch
 def _run(plan: Part, columns: Columns) -> Any:
-    raise AssertionError(plan)
-
-
-@_run.register
-def _run_const(plan: Const, columns: Columns) -> Any:
-    if isinstance(plan.value, bool):
-        return np.asarray(YES if plan.value else NO)
-    return Coded(np.array(0, np.int32), (plan.value,)) if isinstance(plan.value, str) else np.asarray(plan.value)
-
-
-@_run.register
-def _run_given(plan: Given, columns: Columns) -> Any:
-    return columns[plan.name]
-
-
-@_run.register
-def _run_apply(plan: Apply, columns: Columns) -> Any:
-    return settled(plan.function.many(*[_run(part, columns) for part in plan.parts]))
-
-
-@_run.register
-def _run_compare(plan: Compare, columns: Columns) -> Any:
-    values = [_run(part, columns) for part in plan.parts]
-    answer: Any = YES
-    for i, link in enumerate(plan.links):
-        answer = np.minimum(answer, _linked(link, values[i], values[i + 1]))
-    return answer
+    match plan:
+        case Const(bool(value)):
+            return np.asarray(YES if value else NO)
+        case Const(str(value)):
+            return Coded(np.array(0, np.int32), (value,))
+        case Const(value):
+            return np.asarray(value)
+        case Given(name):
+            return columns[name]
+        case Apply(function, parts):
+            return settled(function.many(*[_run(part, columns) for part in parts]))
+        case Compare(parts, links):
+            values = [_run(part, columns) for part in parts]
+            return reduce(np.minimum, (_linked(link, *pair) for link, pair in zip(links, pairwise(values), strict=True)))
+        case Held(part, cell):
+            return _where_held(_run(part, columns), cell)
+        case Logic(word, parts):
+            return reduce(np.minimum if word == "and" else np.maximum, (_run(part, columns) for part in parts))
+        case Negation(part):
+            return YES - _run(part, columns)
+        case Select():
+            return _selected(*(_run(part, columns) for part in (plan.condition, plan.then, plan.otherwise)))
 
 
 def _linked(link: Link, left: Any, right: Any) -> Truths:
@@ -254,9 +249,7 @@ def _recoded(column: Coded, like: Coded) -> NDArray[np.int32]:
     return column.looked_up([code_of.get(v, -2) for v in column.values], -1, np.int32)
 
 
-@_run.register
-def _run_held(plan: Held, columns: Columns) -> Any:
-    value, cell = _run(plan.part, columns), plan.cell
+def _where_held(value: Any, cell: Cell) -> Any:
     if isinstance(value, Coded):
         return value.looked_up([YES if cell.holds(v) else NO for v in value.values], UNKNOWN, np.int8)
     if value.dtype == np.int8:
@@ -276,23 +269,7 @@ def _held(cell: Cell, values: Doubles) -> NDArray[np.bool_]:
     return (span >= 0) & (values <= highs[span])
 
 
-@_run.register
-def _run_logic(plan: Logic, columns: Columns) -> Any:
-    join = np.minimum if plan.word == "and" else np.maximum
-    answer = _run(plan.parts[0], columns)
-    for part in plan.parts[1:]:
-        answer = join(answer, _run(part, columns))
-    return answer
-
-
-@_run.register
-def _run_negation(plan: Negation, columns: Columns) -> Any:
-    return YES - _run(plan.part, columns)
-
-
-@_run.register
-def _run_select(plan: Select, columns: Columns) -> Any:
-    truth, then, otherwise = (_run(part, columns) for part in (plan.condition, plan.then, plan.otherwise))
+def _selected(truth: Truths, then: Any, otherwise: Any) -> Any:
     if isinstance(then, Coded):
         return _chosen_values(truth, then, otherwise)
     missing = UNKNOWN if then.dtype == np.int8 else np.nan

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import singledispatchmethod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -151,33 +150,50 @@ class Programs:
     def emit(self, op: Op, a: int = 0, b: int = 0, c: int = 0) -> None:
         self.code.append((op, a, b, c))
 
-    @singledispatchmethod
     def put(self, plan: Part) -> None:
         """Add the instructions that leave the value of a plan on the stack."""
-        raise AssertionError(plan)
+        match plan:
+            case Const(bool(value)):
+                self.emit(Op.TRUTH, value)
+            case Const(str(value)):
+                self.emit(Op.TEXT, self._listed([value]))
+            case Const(value):
+                self.emit(Op.NUMBER, self._numbered([float(value)]))
+            case Given(name):
+                self.emit(Op.FACT, self._number_of[name])
+            case Apply(function, parts):
+                self._apply(function, *parts)
+            case Compare(parts, links):
+                self.put(parts[0])
+                for at, (link, part) in enumerate(zip(links, parts[1:], strict=True), 1):
+                    self.put(part)
+                    chain = (at < len(links)) + 2 * (at > 1)
+                    self.emit(_COMPARE[_type_of(part)], SIGNS.index(link.sign), _flags(link), chain)
+            case Held(part, cell):
+                for at, accepts in enumerate(cell.accepts.parts if isinstance(cell.accepts, TagMeet) else (cell.accepts,)):
+                    self.put(part)
+                    self._hold(part, Cell(accepts))
+                    if at:
+                        self.emit(Op.AND)
+            case Logic(word, parts):
+                for at, part in enumerate(parts):
+                    self.put(part)
+                    if at:
+                        self.emit(Op.OR if word == "or" else Op.AND)
+            case Negation(part):
+                self.put(part)
+                self.emit(Op.NOT)
+            case Select():
+                for part in (plan.condition, plan.then, plan.otherwise):
+                    self.put(part)
+                self.emit(Op.IF, _type_of(plan))
 
-    @put.register
-    def _of_const(self, plan: Const) -> None:
-        if isinstance(plan.value, bool):
-            self.emit(Op.TRUTH, plan.value)
-        elif isinstance(plan.value, str):
-            self.emit(Op.TEXT, self._listed([plan.value]))
-        else:
-            self.emit(Op.NUMBER, self._numbered([plan.value]))
-
-    @put.register
-    def _of_given(self, plan: Given) -> None:
-        self.emit(Op.FACT, self._number_of[plan.name])
-
-    @put.register
-    def _of_apply(self, plan: Apply) -> None:
-        first, *others = plan.parts
+    def _apply(self, function: Function, first: Part, *others: Part) -> None:
         self.put(first)
-        if plan.function.exponent is not None:
-            self.emit(Op.POWER, plan.function.exponent)
+        if function.exponent is not None:
+            self.emit(Op.POWER, function.exponent)
             return
-        is_clamp = plan.function is FUNCTIONS["clamp"]
-        ops = [Op.HIGHEST, Op.LOWEST] if is_clamp else [_OPS[plan.function]] * max(len(others), 1)
+        ops = [Op.HIGHEST, Op.LOWEST] if function is FUNCTIONS["clamp"] else [_OPS[function]] * max(len(others), 1)
         for part in others[:1]:
             self.put(part)
         self.emit(ops[0])
@@ -186,23 +202,6 @@ class Programs:
             self.emit(op)
         if ops[0] in (Op.LOWEST, Op.HIGHEST):
             self.emit(Op.SETTLE)
-
-    @put.register
-    def _of_compare(self, plan: Compare) -> None:
-        self.put(plan.parts[0])
-        for at, (link, part) in enumerate(zip(plan.links, plan.parts[1:], strict=True), 1):
-            self.put(part)
-            chain = (at < len(plan.links)) + 2 * (at > 1)
-            self.emit(_COMPARE[_type_of(part)], SIGNS.index(link.sign), _flags(link), chain)
-
-    @put.register
-    def _of_held(self, plan: Held) -> None:
-        accepts = plan.cell.accepts
-        for at, part in enumerate(accepts.parts if isinstance(accepts, TagMeet) else (accepts,)):
-            self.put(plan.part)
-            self._hold(plan.part, Cell(part))
-            if at:
-                self.emit(Op.AND)
 
     def _hold(self, part: Part, cell: Cell) -> None:
         accepts = cell.accepts
@@ -219,24 +218,6 @@ class Programs:
             case _:
                 values = accepts if isinstance(accepts, ValueSet) else ValueSet(frozenset(), True)
                 self.emit(Op.IN_TEXTS, self._listed(sorted(map(str, values.values))), len(values.values), values.is_complement)
-
-    @put.register
-    def _of_logic(self, plan: Logic) -> None:
-        for at, part in enumerate(plan.parts):
-            self.put(part)
-            if at:
-                self.emit(Op.OR if plan.word == "or" else Op.AND)
-
-    @put.register
-    def _of_negation(self, plan: Negation) -> None:
-        self.put(plan.part)
-        self.emit(Op.NOT)
-
-    @put.register
-    def _of_select(self, plan: Select) -> None:
-        for part in (plan.condition, plan.then, plan.otherwise):
-            self.put(part)
-        self.emit(Op.IF, _type_of(plan))
 
     def _numbered(self, numbers: list[float]) -> int:
         self.numbers += numbers

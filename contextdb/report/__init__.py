@@ -22,9 +22,9 @@ RENDERERS: Mapping[tuple[Subject, str], tuple[str, tuple[str, ...]]] = {
     ("coverage", "text"): ("coverage_text", ("colour", "width", "shows_all")),
     ("coverage", "json"): ("render_json", ()),
     ("coverage", "github"): ("render_github", ()),
-    ("coverage", "junit"): ("coverage_junit", ()),
+    ("coverage", "junit"): ("render_junit:render_coverage", ()),
     ("coverage", "sarif"): ("render_sarif", ("shows_all",)),
-    ("coverage", "markdown"): ("coverage_markdown", ("shows_all",)),
+    ("coverage", "markdown"): ("coverage_document:as_comment", ("shows_all",)),
     ("coverage", "html"): ("document_html:as_html", ()),
     ("measures", "text"): ("document:as_text", ("colour", "width", "shows_all")),
     ("measures", "json"): ("render_json", ()),
@@ -40,7 +40,7 @@ RENDERERS: Mapping[tuple[Subject, str], tuple[str, tuple[str, ...]]] = {
 """For each subject and format the module that renders it, by `render` or by the function after the colon, and its options."""
 DOCUMENTS: Mapping[Subject, str] = {
     "coverage": "coverage_document",
-    "measures": "measure_document",
+    "measures": "measure_results",
     "motion coverage": "motion_coverage_document",
 }
 """The module that writes the document of a subject, by `document`."""

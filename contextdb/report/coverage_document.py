@@ -11,7 +11,8 @@ from contextdb.errors import joined, plural
 from contextdb.findings import LEVELS, Finding
 from contextdb.report import coverage_words as words
 from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments, gap_size, has_moments
-from contextdb.report.document import Bar, Block, Document, Picture, Row, Rows, Section, Table
+from contextdb.report.document import Bar, Block, Document, Picture, Row, Rows, Section, Table, as_markdown
+from contextdb.report.render_markdown import MOST_BYTES
 from contextdb.report.results import as_path
 from contextdb.tables.variety import VARIETY
 
@@ -201,3 +202,19 @@ def _change(measured: Measured, most: int) -> Iterator[Block]:
     if dead := [measured.named(finding.row) for finding in change.dead if finding.row is not None]:
         rows.append(Row((f"newly dead: {joined(dead, most)}",)))
     yield Rows("Since the baseline", rows)
+
+
+# ---- coverage as Markdown, for a job summary or a comment on a pull request: small enough to be posted
+
+STEPS = (10, 5, 3, 1)
+"""How many gaps, pairs and rows of a rule are listed: the first that fits."""
+MOST_TABLES = 50
+
+
+def as_comment(results: CoverageResults, shows_all: bool = False) -> str:
+    """As much detail as a comment on a pull request holds; everything with `shows_all`."""
+    if shows_all:
+        return as_markdown(document(results), sys.maxsize)
+    texts = (as_markdown(document(results, most=most), sys.maxsize) for most in STEPS)
+    fitting = next((text for text in texts if len(text.encode()) <= MOST_BYTES), None)
+    return fitting or as_markdown(document(results, most=0, most_tables=MOST_TABLES))

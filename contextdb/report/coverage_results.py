@@ -10,11 +10,10 @@ from typing import ClassVar, Literal
 
 from contextdb.cells.conditions import Condition
 from contextdb.covering import CoverageReport, Gap, PairTable, Slice, format_percent
-from contextdb.covering.baseline import CaseCounts, Change
-from contextdb.covering.declared import Declared
+from contextdb.covering.baseline import CaseCounts, Change, Declared
 from contextdb.covering.expected import Expectation
 from contextdb.covering.pairs import left_out
-from contextdb.covering.shares import distinct_percents
+from contextdb.covering.report import distinct_percents
 from contextdb.errors import in_quotes, plural, row_name, some
 from contextdb.files.reports import with_marks
 from contextdb.findings import Finding
@@ -160,7 +159,6 @@ class CoverageResults:
 
     @property
     def passed(self) -> bool:
-        """Whether every threshold is met."""
         return all(gate.passed for gate in self.gates)
 
     @property

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextdb.covering import CoverageReport, Gap, Slice, format_percent
 from contextdb.covering.baseline import Change
 from contextdb.covering.expected import Todo
-from contextdb.covering.report import share_at_once
-from contextdb.covering.shares import distinct_percents
+from contextdb.covering.report import distinct_percents, share_at_once
 from contextdb.errors import in_quotes, joined, nearest, plural, row_name
 from contextdb.findings import Finding
 from contextdb.report.coverage_results import Measured, has_moments

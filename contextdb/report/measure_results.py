@@ -17,6 +17,7 @@ from contextdb.findings import Finding
 from contextdb.motion.measuring.measures import Measures
 from contextdb.motion.measuring.parts import NO_CHANGE, NO_FORCED, NO_JUMP, NO_REST
 from contextdb.motion.trace.stats import ForcedBy
+from contextdb.report.document import Block, Document, Listing, Section, Table
 from contextdb.report.results import CheckReport, Gate, Subject, as_path
 
 NOTHING_TO_EXCEED = (NO_FORCED, NO_JUMP, NO_CHANGE, NO_REST)
@@ -229,3 +230,35 @@ def _no_measure(session: Mapping[str, object]) -> str:
         if value is not None and not is_number:
             return f"has no number as {in_quotes(line.key)}"
     return ""
+
+
+# ---- measures as a document: one table a session with columns for raw clips and the baseline
+
+HEADERS = ("measure", "session", "raw clips", "before")
+
+
+def document(results: MeasureResults, shows_all: bool = False, is_page: bool = False) -> Document:
+    return Document("motion measure", "session", [_section(session, shows_all) for session in results.sessions])
+
+
+def _section(session: SessionMeasures, shows_all: bool) -> Section:
+    rows = list(session.rows())
+    used = [i for i in range(len(HEADERS)) if i < 2 or any(row[i] for row in rows)]
+    head, *body = [[row[i] for i in used] for row in (HEADERS, *rows)]
+    never = [in_quotes(name) for name in session.measures.assets_never_used or ()]
+    forced = [each.sentence(session.measures.forced_jumps) for each in session.forced_by]
+    blocks: list[Block] = [
+        Table(head, body),
+        *forced,
+        *session.not_measured(),
+        *([Listing("never played", never)] if never else []),
+    ]
+    return Section(session.file, session.headline, [session.to_do], blocks, _gates(session, shows_all))
+
+
+def _gates(session: SessionMeasures, shows_all: bool) -> list[Gate]:
+    """The thresholds; of the comparisons with the baseline those that fail, or one that says that none does."""
+    compared = [gate for gate in session.gates if gate.name.startswith("baseline")]
+    gates = [gate for gate in session.gates if shows_all or gate not in compared or not gate.passed]
+    is_no_worse = bool(compared) and all(gate.passed for gate in compared)
+    return [*gates, Gate("baseline", 0.0, 0.0, True, "nothing is worse")] if is_no_worse else gates

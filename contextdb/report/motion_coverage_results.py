@@ -13,7 +13,7 @@ import numpy as np
 from contextdb.authoring.motion_coverage import TableMotion
 from contextdb.cells.words import cells_text
 from contextdb.covering import format_percent
-from contextdb.covering.declared import NOTHING, Declared, require_declared
+from contextdb.covering.baseline import NOTHING, Declared, require_declared
 from contextdb.errors import ContextError, Fault, Place, in_quotes, plural, some
 from contextdb.files.reports import baseline_of, with_marks
 from contextdb.motion.clips.quaternions import Floats
@@ -134,7 +134,6 @@ class MotionCoverageResults:
 
     @property
     def passed(self) -> bool:
-        """Whether every threshold is met."""
         return all(gate.passed for gate in self.gates)
 
     @property

@@ -4,9 +4,9 @@ measured."""
 from __future__ import annotations
 
 from contextdb.console import printable
-from contextdb.report.junit_parts import bars_of, document
 from contextdb.report.measure_results import MeasureResults, SessionMeasures
 from contextdb.report.motion_coverage_results import MotionCoverageResults, MotionMeasured, capture_sentence
+from contextdb.report.render_junit import bars_of, document
 
 MOST_CAPTURES = 5
 

@@ -7,16 +7,18 @@ the same findings give the same bytes.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from xml.etree import ElementTree as ET
 
 from contextdb.checks.rules import TABLE_RULES
 from contextdb.console import printable
+from contextdb.covering import Gap
 from contextdb.covering.contracts import Proof
 from contextdb.errors import plural
 from contextdb.findings import Finding, Level
-from contextdb.report.junit_parts import case_in, document
-from contextdb.report.results import CheckReport, Group, message_of, place_of
+from contextdb.report.coverage_results import CoverageResults, Measured, gap_moments
+from contextdb.report.coverage_words import gaps_sentence
+from contextdb.report.results import CheckReport, Gate, Group, as_path, message_of, place_of
 
 MOST_LISTED = 200
 """The most findings that a case lists before it says how many more there are: CI systems refuse reports that grow without end."""
@@ -87,3 +89,76 @@ def _lines(findings: list[Finding], shows_all: bool) -> Iterator[str]:
 def _placed(finding: Finding) -> str:
     place = place_of(finding)
     return f"{place}: {message_of(finding)}" if place else message_of(finding)
+
+
+# ---- jUnit XML: the document, its suites and cases, and bars as cases
+
+
+def document(name: str, suites: Iterable[ET.Element]) -> str:
+    """A document of some suites, which are counted here."""
+    root = ET.Element("testsuites", name=name)
+    root.extend(suites)
+    for suite in root:
+        counts = {"tests": len(suite), "failures": len(suite.findall("testcase/failure")), "errors": 0, "skipped": 0}
+        for key, count in counts.items():
+            suite.set(key, str(count))
+    for key in ("tests", "failures", "errors", "skipped"):
+        root.set(key, str(sum(int(suite.get(key, "0")) for suite in root)))
+    ET.indent(root)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
+
+
+def case_in(suite: ET.Element, name: str, file: str | None = None) -> ET.Element:
+    case = ET.SubElement(suite, "testcase", classname=suite.get("name", ""), name=name, time="0")
+    if file:
+        case.set("file", as_path(file))
+    return case
+
+
+def bars_of(
+    what: str, bars: Sequence[Gate], reached: str, otherwise: str, file: str | None = None, *, in_passed: bool = False
+) -> ET.Element:
+    """The thresholds of one table or session as a suite: `reached` is the text of a missed one, and with
+    `in_passed` of a met one too.
+
+    Without a threshold `reached` is in a case that is called `otherwise`.
+    """
+    suite = ET.Element("testsuite", name=printable(what))
+    for bar in bars:
+        case, message = case_in(suite, bar.name, file), printable(bar.message)
+        if bar.passed:
+            ET.SubElement(case, "system-out").text = f"{message}\n{reached}" if in_passed and reached else message
+        else:
+            ET.SubElement(case, "failure", type=bar.name, message=message).text = reached
+    if not bars:
+        ET.SubElement(case_in(suite, otherwise, file), "system-out").text = reached
+    return suite
+
+
+# ---- coverage as JUnit XML: one suite a table, one case a bar; a table without a bar has one case that tells its share
+
+MOST_GAPS = 20
+
+
+def render_coverage(results: CoverageResults) -> str:
+    others = (bars_of(name, [gate], "", "coverage", in_passed=True) for name, gate in results.others)
+    measured = (
+        bars_of(each.report.table, each.gates, "\n".join(_coverage_lines(each)), "coverage", each.file, in_passed=True)
+        for each in results.tables
+    )
+    return document("contextdb coverage", [*others, *measured])
+
+
+def _coverage_lines(measured: Measured) -> list[str]:
+    report = measured.report
+    lines = [report.headline, gaps_sentence(report)]
+    if measured.change is not None:
+        lines += [f"new gap: {gap.text}" for gap in measured.change.opened[:MOST_GAPS]]
+    lines += [f"gap: {gap.text}{_moments(gap)}" for gap in report.gaps[:MOST_GAPS]]
+    if len(report.gaps) > MOST_GAPS:
+        lines.append(f"… and {len(report.gaps) - MOST_GAPS:,} more")
+    return [printable(line) for line in lines]
+
+
+def _moments(gap: Gap) -> str:
+    return "" if gap.telemetry is None else f" ({gap_moments(gap)} of the recorded moments)"

@@ -77,7 +77,6 @@ class Gate:
 
     @property
     def word(self) -> str:
-        """Whether it passed, in a word."""
         return "failed" if not self.passed else "skipped" if self.is_accepted and self.value is None else "passed"
 
     def findings(self, table: str, file: str | None = None) -> Iterator[Finding]:

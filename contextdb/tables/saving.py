@@ -17,8 +17,7 @@ from contextdb.files.texts import new_source
 from contextdb.tables.data import AnyTable, TableData
 from contextdb.tables.merging.alignment import align
 from contextdb.tables.merging.conflicts import Conflict
-from contextdb.tables.merging.merging import merge
-from contextdb.tables.merging.reading import table_of
+from contextdb.tables.merging.merging import merge, table_of
 
 MOST_NAMED = 3
 

@@ -7,7 +7,6 @@ matches Any alone. Of each chunk the distinct pairs of answers are looked at onc
 
 from __future__ import annotations
 
-import os
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from contextdb import bitmask
 from contextdb.bitmask import Words
 from contextdb.cells.conditions import Condition
 from contextdb.compiled.batch import query_encoded
@@ -27,9 +27,8 @@ from contextdb.disk.engines import Engine, with_dask
 from contextdb.errors import ContextDBError, Fault, FileError
 from contextdb.telemetry.characters import Characters, Played, characters_json, joined
 from contextdb.telemetry.chunks import Chunk, chunks_of
-from contextdb.telemetry.contexts import context_files
-from contextdb.telemetry.facts_read import FactColumn, read_facts
-from contextdb.telemetry.keys import Counts, grouped
+from contextdb.telemetry.contexts import distinct_files
+from contextdb.telemetry.facts_read import Counts, FactColumn, grouped, read_facts
 from contextdb.telemetry.observe_file import moments_of
 
 EMPTIED, FILLED, GAINS, LOSES = "emptied", "filled", "gains", "loses"
@@ -194,8 +193,7 @@ def backtest(
 ) -> Backtest:
     """Ask both versions in every moment of some files. Raises FileError where none of them can be read, EngineError where Dask did
     not finish one."""
-    by_path = {os.path.realpath(path): path for pattern in patterns for path in context_files(pattern)}
-    paths = sorted(by_path.values())
+    paths = distinct_files(patterns)
     n_done, total = 0, Backtest()
 
     def tell(share: float) -> None:
@@ -235,7 +233,7 @@ def _of_chunk(comparison: Comparison, names: Sequence[str], chunk: Chunk, file: 
     keys = [*masks, *([] if played is None else [played.codes[:, None].astype(np.uint64)])]
     words = np.ascontiguousarray(np.concatenate(keys, axis=1).T)
     _, first, sums = grouped(words, moments)
-    pairs = [_bits(mask[first], table.n_rows) for mask, table in zip(masks, comparison.tables, strict=True)]
+    pairs = [bitmask.unpack(mask[first], table.n_rows) for mask, table in zip(masks, comparison.tables, strict=True)]
     part, own, flags = _sums(comparison, pairs, sums)
     if played is not None:
         part.characters = played.sums(file, moments, played.codes[first], sums, flags)
@@ -267,10 +265,6 @@ def _masks(compiled: CompiledData, names: Sequence[str], chunk: Chunk, known: di
     if not columns:
         return np.repeat(compiled.enabled[None], chunk.n_rows, axis=0)
     return query_encoded(compiled, columns, "never").mask
-
-
-def _bits(masks: Words, n_rows: int) -> Flags:
-    return np.unpackbits(np.ascontiguousarray(masks).view(np.uint8), axis=1, bitorder="little", count=n_rows).astype(np.bool_)
 
 
 def _sums(comparison: Comparison, pairs: Sequence[Flags], sums: Counts) -> tuple[Backtest, list[tuple[str, int]], list[Flags]]:

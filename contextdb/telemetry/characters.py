@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from contextdb.bitmask import Flags
 from contextdb.errors import Place, TableError, no_such, plural
 from contextdb.telemetry.chunks import Chunk
-from contextdb.telemetry.keys import Counts
+from contextdb.telemetry.facts_read import Counts
 
 ALL = "all"
 COUNTED = ("moments", "changed", "emptied", "filled")

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -61,6 +61,12 @@ def context_files(pattern: str) -> list[Path]:
         accepted = "a .csv, .parquet or .jsonl file, or a glob"
         raise FileError(Fault("no file of contexts is there.", accepted, _near(Path(pattern)), Place(pattern), "no-such-path"))
     return files
+
+
+def distinct_files(patterns: Iterable[str]) -> list[Path]:
+    """The files that some paths or globs mean, each once, in the order of their names. Raises FileError as `context_files`."""
+    by_path = {os.path.realpath(path): path for pattern in patterns for path in context_files(pattern)}
+    return sorted(by_path.values())
 
 
 def _near(path: Path) -> str:

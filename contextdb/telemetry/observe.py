@@ -33,8 +33,8 @@ from contextdb.disk.boundary import inside
 from contextdb.disk.engines import ENGINES, Engine, with_dask
 from contextdb.errors import ContextDBError, ContextError, Fault, FileError, no_such
 from contextdb.tables.table import EitherTable
-from contextdb.telemetry.contexts import context_files
-from contextdb.telemetry.keys import estimated
+from contextdb.telemetry.contexts import distinct_files
+from contextdb.telemetry.facts_read import estimated
 from contextdb.telemetry.observe_file import observe_file
 from contextdb.telemetry.observed import BadFile, FactNote, Observed, SeenGap
 from contextdb.telemetry.parts import MOST_HASHES, MOST_OPEN, Part, Plan, added, nothing
@@ -131,8 +131,7 @@ def _paths(files: str | Path | Sequence[str | Path]) -> list[Path]:
     patterns = [require_path(each, "one of files") for each in several]
     if not patterns:
         raise FileError(Fault("no file of contexts is given.", "a .csv, .parquet or .jsonl file, or a glob", rule="no-such-path"))
-    by_path = {os.path.realpath(path): path for pattern in patterns for path in context_files(str(pattern))}
-    return sorted(by_path.values())
+    return distinct_files(map(str, patterns))
 
 
 def _parts(
@@ -221,7 +220,7 @@ class SavedParts:
             raw = read_bytes(self._file(path))
             with np.load(io.BytesIO(raw), allow_pickle=False) as arrays:
                 about = json.loads(str(arrays["about"]))
-                if about["for"] != self._key(path):
+                if about["for"] != self.key(path):
                     return None
                 saved = {name: arrays[name] for name in _ARRAYS}
         except (ContextDBError, OSError, ValueError, KeyError, EOFError, TypeError, IndexError):
@@ -234,10 +233,6 @@ class SavedParts:
         given |= {name: Counter(about[name]) for name in ("missing", "outside")}
         examples = {name: tuple(texts) for name, texts in about["examples"].items()}
         return Part(**given, examples=examples, columns=frozenset(about["columns"]))
-
-    def key(self, path: Path) -> str:
-        """What a part is for: taken before its file is read, so that one written to meanwhile does not count."""
-        return self._key(path)
 
     def put(self, path: Path, part: Part, key: str) -> None:
         """Keep the part of a file, unless it could not be read."""
@@ -254,7 +249,8 @@ class SavedParts:
         name = hashlib.sha256(os.path.realpath(path).encode("utf-8", "surrogateescape")).hexdigest()[:24]
         return inside(self.folder / f"{name}.npz", self.folder)
 
-    def _key(self, path: Path) -> str:
+    def key(self, path: Path) -> str:
+        """What a part is for: taken before its file is read, so that one written to meanwhile does not count."""
         seen = os.stat(path)
         return f"{self.digest} {seen.st_size} {seen.st_mtime_ns}"
 

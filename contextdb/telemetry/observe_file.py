@@ -24,9 +24,7 @@ from contextdb.compiled.batch import answered
 from contextdb.errors import ContextDBError, Fault, Place, TableError, in_quotes, no_such, plural
 from contextdb.telemetry import parts
 from contextdb.telemetry.chunks import Chunk, chunks_of
-from contextdb.telemetry.facts_read import FactColumn, read_facts
-from contextdb.telemetry.fields import Fields
-from contextdb.telemetry.keys import Counts, Hashes, KeyWords, begins, grouped
+from contextdb.telemetry.facts_read import Counts, FactColumn, Fields, Hashes, KeyWords, begins, grouped, read_facts
 from contextdb.telemetry.parts import Part, Plan, most_examples, nothing, require_countable
 
 Chunks = Iterable[tuple[Sequence[str], Chunk]]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from contextdb.cells.words import InCells
-from contextdb.covering.report import Nearest
-from contextdb.covering.shares import format_percent
+from contextdb.covering.report import Nearest, format_percent
 from contextdb.errors import Fault
 
 

@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from contextdb.compiled.data import CompiledData
 from contextdb.covering.factors import TagFactor
 from contextdb.errors import Fault, TableError
-from contextdb.telemetry.facts_read import MOST_EXAMPLES
-from contextdb.telemetry.fields import Fields
-from contextdb.telemetry.keys import Counts, Hashes, begins
+from contextdb.telemetry.facts_read import MOST_EXAMPLES, Counts, Fields, Hashes, begins
 
 MOST_OPEN = 1 << 13
 """Different contexts without a row that a part keeps: these make the gaps."""

@@ -16,12 +16,12 @@ from contextdb.cells.grammar import parse_cell
 from contextdb.compiled.classes import TagMasks, ValueMasks
 from contextdb.compiled.data import CompiledData
 from contextdb.covering.assumed import Opened
-from contextdb.covering.count import uncovered_share
-from contextdb.covering.engine import SAMPLES
+from contextdb.covering.count import Bounds, uncovered_share
+from contextdb.covering.engine import SAMPLES, measure_of
 from contextdb.covering.factors import Factor, NumberFactor, ValueFactor
-from contextdb.covering.gaps import SHARE_WORK, Measure, NearRows, gap_id, share_of, widened
+from contextdb.covering.gaps import Measure, NearRows, gap_id, widened
 from contextdb.covering.report import CoverageReport, Gap
-from contextdb.covering.sample import SampledShares, Sampler, samples_of
+from contextdb.covering.sample import samples_of
 from contextdb.covering.space import Box, Sides, Space
 from contextdb.telemetry.observed import Observed, SeenGap
 from contextdb.telemetry.parts import Part
@@ -159,7 +159,8 @@ def ranked(report: CoverageReport, ready: Opened, seen: Observed, work: int, sam
     cells = {gap.id: gap.cells for gap in report.gaps} | {gap.id: gap.cells for gap in seen.gaps}
     boxes = {gap_id: box_of(ready.space, own) for gap_id, own in cells.items()}
     listed = [replace(g, telemetry=moments.get(g.id, None if boxes[g.id] is None else 0.0)) for g in report.gaps]
-    measure = _measure(ready, work, samples, report.seed)
+    possible = uncovered_share(ready.space, ready.space.impossible, work) if ready.drawer is None else Bounds(0.0, 1.0)
+    measure = measure_of(ready, possible, work, samples_of(samples, SAMPLES, ready.space), report.seed)
     for gap in seen.gaps:
         box = boxes[gap.id]
         if gap.id not in known and box is not None:
@@ -182,18 +183,6 @@ def _renewed(space: Space, gaps: Sequence[Gap], boxes: Mapping[str, Box | None],
             earlier.append(sides)
         renewed.append(gap)
     return renewed
-
-
-def _measure(ready: Opened, work: int, samples: int | None, seed: int) -> Measure:
-    """What tells the share of a box, as in the report."""
-    space = ready.space
-    if ready.drawer is not None:
-        return SampledShares.of(
-            Sampler(space, drawer=ready.drawer), samples_of(samples, SAMPLES, space), np.random.default_rng(seed)
-        )
-    possible = uncovered_share(space, space.impossible, work)
-    impossible = [space.sides_of(box) for box in space.impossible]
-    return lambda box, without: share_of(space, box, [*impossible, *without], possible, min(work, SHARE_WORK))
 
 
 def box_of(space: Space, cells: Mapping[str, str]) -> Box | None:

@@ -7,8 +7,7 @@ import pytest
 
 from contextdb.covering import coverage
 from contextdb.covering.assumed import opened
-from contextdb.covering.baseline import Change, Earlier, compared, read_baseline
-from contextdb.covering.declared import declared
+from contextdb.covering.baseline import Change, Earlier, compared, declared, read_baseline
 from contextdb.errors import ContextError
 from contextdb.files.reports import sealed, with_marks
 from contextdb.report.render_json import as_json

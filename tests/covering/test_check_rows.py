@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import contextdb as cdb
-from contextdb.checks.rows import check_rows
+from contextdb.checks.run import check_rows
 from contextdb.commands.check_command import check_path
 from contextdb.covering import coverage
 from contextdb.schema.settings import TableSettings

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import contextdb as cdb
-from contextdb.covering import coverage, crowded
+from contextdb.covering import coverage, engine
 
 SEEDS = st.integers(0, 2**32)
 
@@ -57,8 +57,8 @@ def test_contexts_are_climbed_from_as_far_as_their_work_goes(monkeypatch: pytest
     columns = {name: ["True" if i == r else "Any" for r in range(20)] for i, name in enumerate(names)}
     table = cdb.Table.from_columns({"Asset": ["A"] * 20, **columns}, {name: {"type": "bool"} for name in names})
     climbs: list[tuple[int, ...]] = []
-    real = crowded._climbed
-    monkeypatch.setattr(crowded, "_climbed", lambda *given: climbs.append(given[-1]) or real(*given))
-    monkeypatch.setattr(crowded, "MOST_CLASSES", 0)
+    real = engine._climbed
+    monkeypatch.setattr(engine, "_climbed", lambda *given: climbs.append(given[-1]) or real(*given))
+    monkeypatch.setattr(engine, "MOST_CLASSES", 0)
     assert coverage(table, samples=200).crowded[0].rows == tuple(range(20))
-    assert len(climbs) == crowded.MOST_CROWDS
+    assert len(climbs) == engine.MOST_CROWDS

@@ -11,9 +11,8 @@ import pytest
 
 import contextdb as cdb
 from contextdb.covering import count, coverage, format_percent
-from contextdb.covering.report import share_at_once
+from contextdb.covering.report import distinct_percents, share_at_once, wilson
 from contextdb.covering.sample import MOST_WORDS, samples_of
-from contextdb.covering.shares import distinct_percents, wilson
 from contextdb.schema.settings import TableSettings
 
 SPEED = {"speed": {"type": "number", "min": 0.0, "max": 10.0}}

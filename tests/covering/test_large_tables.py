@@ -15,7 +15,7 @@ import contextdb as cdb
 from contextdb import bitmask
 from contextdb.cells.domains import Domain
 from contextdb.cells.grammar import ValueSet
-from contextdb.checks.rows import check_rows
+from contextdb.checks.run import check_rows
 from contextdb.compiled.table import data_of
 from contextdb.covering import coverage, pairs
 from contextdb.covering.assumed import opened

@@ -11,7 +11,7 @@ from strategies import TAGS, examples
 import contextdb as cdb
 from contextdb.cells.domains import Domain
 from contextdb.cells.sets import TagSet, covered_by, covers
-from contextdb.checks.rows import check_rows
+from contextdb.checks.run import check_rows
 from contextdb.compiled.table import data_of
 from contextdb.covering import coverage
 from contextdb.covering.count import Bounds, uncovered_share

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from strategies import examples
 
 import contextdb as cdb
-from contextdb.checks.rows import check_rows
+from contextdb.checks.run import check_rows
 from contextdb.covering.count import uncovered_share
 from contextdb.covering.factors import ValueFactor
 from contextdb.covering.judge import AHEAD

@@ -6,7 +6,7 @@ from xml.sax.saxutils import escape
 import pytest
 from strategies import for_each
 
-from contextdb.exchange.feel_rules import rule_of
+from contextdb.exchange.feel import rule_of
 from contextdb.exchange.formats import read
 from contextdb.exchange.importing import plan_import, table_of
 from contextdb.exchange.mapping import propose

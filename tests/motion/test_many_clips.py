@@ -14,7 +14,7 @@ from running import run
 from strategies import in_full_runs
 
 from contextdb import motion
-from contextdb.authoring import clip_looks, saved_looks
+from contextdb.authoring import clip_looks
 from contextdb.disk import engines
 from contextdb.errors import MotionError
 from contextdb.files import scratch, tensors
@@ -143,8 +143,7 @@ def test_all_cores_describe_and_prepare_as_one_process_does(folder: Path, comman
 
 @pytest.mark.parametrize("command", ["describe", "prepare"])
 def test_a_run_that_was_stopped_does_not_look_again_at_what_it_saw(folder: Path, command: str, monkeypatch: pytest.MonkeyPatch):
-    for module in (clip_looks, saved_looks):
-        monkeypatch.setattr(module, "MANY", 3)
+    monkeypatch.setattr(clip_looks, "MANY", 3)
     monkeypatch.setattr(clip_looks, "CHUNK", 4)
     monkeypatch.setattr(engines, "n_cores", lambda: 1)
     whole = run("motion", command, folder / "clips")

@@ -12,8 +12,7 @@ from test_mocap import FOLDER, listed, load
 from contextdb.errors import MotionError
 from contextdb.motion import Clip, FeatureSchema, Skeleton
 from contextdb.motion.clips.foot_bones import feet_of
-from contextdb.motion.clips.mirror import mirrored, partners_of, unevenness
-from contextdb.motion.clips.own_axes import fixed_joints, has_even_axes, own_axes
+from contextdb.motion.clips.mirror import fixed_joints, has_even_axes, mirrored, own_axes, partners_of, unevenness
 from contextdb.motion.clips.poses import LocalPoses, forward_kinematics, local_poses
 from contextdb.motion.clips.quaternions import inverse, matrices, multiply, rotation_vectors
 from contextdb.motion.clips.skeleton import sided_pairs

@@ -12,8 +12,8 @@ from contextdb.motion.clips.mirror import mirrored
 from contextdb.motion.clips.poses import LocalPoses, Poses, forward_kinematics
 from contextdb.motion.clips.quaternions import about_axis, rotate
 from contextdb.motion.clips.trajectory import Trajectory, unbroken
+from contextdb.motion.made.body import about_turn, timeline
 from contextdb.motion.made.recipes import ABOUT_TURNS, RAMP_S, RECIPES
-from contextdb.motion.made.steps import about_turn, timeline
 
 SMOOTH = FeatureSchema.from_dict(
     "loco",

@@ -15,8 +15,7 @@ from report_strategies import MARKUP
 
 from contextdb.covering import coverage, pairs
 from contextdb.covering.assumed import opened
-from contextdb.covering.baseline import compared, read_baseline
-from contextdb.covering.declared import declared
+from contextdb.covering.baseline import compared, declared, read_baseline
 from contextdb.covering.report import Overlap
 from contextdb.report import formats, render
 from contextdb.report.coverage_results import CoverageResults, Measured, fail_under, fail_under_telemetry, max_drop, table_gone

@@ -6,7 +6,7 @@ import pytest
 from contextdb import bitmask
 from contextdb.compiled.many import rows_of
 from contextdb.core import pack_codes, unpack_codes
-from contextdb.telemetry import keys
+from contextdb.telemetry import facts_read
 from contextdb.telemetry.observe_file import SmallestHashes, SmallestKeys
 from contextdb.telemetry.parts import MOST_HASHES
 
@@ -28,23 +28,23 @@ def test_grouping_sums_the_moments_of_equal_contexts_and_leaves_out_those_of_non
     for key, n in zip(words.T.tolist(), moments.tolist(), strict=True):
         if n:
             expected[tuple(key)] = expected.get(tuple(key), 0) + n
-    assert summed(words, keys.grouped(words, moments)) == expected
+    assert summed(words, facts_read.grouped(words, moments)) == expected
 
 
 def test_contexts_of_one_hash_are_still_told_apart(words, monkeypatch):
-    monkeypatch.setattr(keys, "hashes_of", lambda words: np.full(words.shape[1], 7, np.uint64))
-    _, first, sums = keys.grouped(np.ascontiguousarray(words[:, :300]), np.ones(300, np.int64))
+    monkeypatch.setattr(facts_read, "hashes_of", lambda words: np.full(words.shape[1], 7, np.uint64))
+    _, first, sums = facts_read.grouped(np.ascontiguousarray(words[:, :300]), np.ones(300, np.int64))
     assert len(first) == len(np.unique(words[:, :300], axis=1).T)
     assert sums.sum() == 300
 
 
 def test_of_no_contexts_there_are_no_groups(words):
-    assert [len(part) for part in keys.grouped(words, np.zeros(3000, np.int64))] == [0, 0, 0]
+    assert [len(part) for part in facts_read.grouped(words, np.zeros(3000, np.int64))] == [0, 0, 0]
 
 
 def test_a_key_has_a_hash_that_stays_the_same_on_every_machine():
     words = np.array([[0, 1, 2**64 - 1], [5, 5, 5]], np.uint64)
-    assert keys.hashes_of(words).tolist() == [4517933670823692284, 12773366489153039575, 3846658174030194800]
+    assert facts_read.hashes_of(words).tolist() == [4517933670823692284, 12773366489153039575, 3846658174030194800]
 
 
 def test_codes_come_out_of_keys_as_they_were_put_in(words):
@@ -105,7 +105,7 @@ def test_contexts_of_the_smallest_hashes_have_all_their_moments():
 
 
 def test_more_contexts_than_are_kept_are_estimated_within_two_percent():
-    hashes = keys.hashes_of(np.arange(500_000, dtype=np.uint64)[None])
+    hashes = facts_read.hashes_of(np.arange(500_000, dtype=np.uint64)[None])
     kept = np.sort(hashes)[:MOST_HASHES]
-    assert keys.estimated(kept, True) == pytest.approx(500_000, rel=0.02)
-    assert keys.estimated(kept[:10], False) == 10
+    assert facts_read.estimated(kept, True) == pytest.approx(500_000, rel=0.02)
+    assert facts_read.estimated(kept[:10], False) == 10

@@ -14,7 +14,7 @@ from links import FACTS, LIMIT_S, listening, meeting, next_lines, table, until
 from running import run
 
 import contextdb as cdb
-from contextdb.telemetry.link import doors, folder, hearing, listeners, writer
+from contextdb.telemetry.link import doors, hearing, listeners, writer
 from contextdb.telemetry.link.doors import connected
 from contextdb.telemetry.link.lines import MOST_DEPTH, MOST_NAME
 
@@ -125,14 +125,14 @@ def test_a_link_or_a_file_in_place_of_a_socket_is_neither_followed_nor_deleted(m
 
 
 def test_a_runtime_folder_that_others_may_write_to_is_passed_over(meeting: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(folder.tempfile, "tempdir", str(meeting.parent))
+    monkeypatch.setattr(doors.tempfile, "tempdir", str(meeting.parent))
     meeting.parent.chmod(0o770)
-    assert folder.runtime_folder() == meeting.parent / f"contextdb-{os.getuid()}"
+    assert doors.runtime_folder() == meeting.parent / f"contextdb-{os.getuid()}"
 
 
 def test_a_program_that_holds_the_folder_does_not_stop_a_game(meeting: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(folder, "TURN_S", 0.0)
-    with folder.turn(folder.runtime_folder()), pytest.raises(cdb.FileError, match="another program holds the folder"):
+    monkeypatch.setattr(doors, "TURN_S", 0.0)
+    with doors.turn(doors.runtime_folder()), pytest.raises(cdb.FileError, match="another program holds the folder"):
         cdb.link("game")
 
 
@@ -217,10 +217,10 @@ def test_a_game_that_never_ends_its_header_is_given_up(meeting: Path, monkeypatc
 
 
 def test_of_many_characters_of_a_game_the_first_are_forgotten(monkeypatch: pytest.MonkeyPatch):
-    from contextdb.commands import live_views
+    from contextdb.commands import live_command
 
-    monkeypatch.setattr(live_views, "MOST_KNOWN_BYTES", 1000)
-    changes = live_views.Changes({}, False)
+    monkeypatch.setattr(live_command, "MOST_KNOWN_BYTES", 1000)
+    changes = live_command.Changes({}, False)
     for number in range(100):
         assert changes.of({**ASK, "who": f"w{number}"}, 100).lines
     assert len(changes._known) == 10

@@ -17,7 +17,7 @@ from links import FACTS, LIMIT_S, listening, meeting, next_lines, table, until
 from strategies import IS_FULL
 
 import contextdb as cdb
-from contextdb.telemetry.link import doors, folder, hearing, listeners
+from contextdb.telemetry.link import doors, hearing, listeners
 from contextdb.telemetry.link.doors import connected
 from contextdb.telemetry.link.listeners import MOST_PENDING
 
@@ -51,7 +51,7 @@ def test_a_folder_of_another_user_is_refused(meeting: Path, monkeypatch: pytest.
     meeting.mkdir(mode=0o700)
     found = os.lstat(meeting)
     stranger = os.stat_result((found.st_mode, *found[1:4], found.st_uid + 1, *found[5:]))
-    monkeypatch.setattr(folder.os, "lstat", lambda path, **options: stranger)
+    monkeypatch.setattr(doors.os, "lstat", lambda path, **options: stranger)
     with pytest.raises(cdb.FileError, match="belongs to another user"):
         cdb.link("game")
 
@@ -65,9 +65,9 @@ def test_a_link_in_place_of_the_folder_is_refused(meeting: Path, tmp_path: Path)
 
 def test_a_runtime_folder_of_another_user_is_passed_over(monkeypatch: pytest.MonkeyPatch, meeting: Path):
     monkeypatch.setenv("TMPDIR", str(meeting.parent))
-    monkeypatch.setattr(folder.tempfile, "tempdir", None)
+    monkeypatch.setattr(doors.tempfile, "tempdir", None)
     monkeypatch.setenv("XDG_RUNTIME_DIR", "relative")
-    assert folder.runtime_folder() == meeting.parent / f"contextdb-{os.getuid()}"
+    assert doors.runtime_folder() == meeting.parent / f"contextdb-{os.getuid()}"
 
 
 def test_who_connects_as_another_user_is_sent_nothing(meeting: Path, monkeypatch: pytest.MonkeyPatch):

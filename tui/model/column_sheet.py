@@ -17,7 +17,7 @@ from contextdb.cells.outputs import Output
 from contextdb.cells.words import format_number, quoted
 from contextdb.edits.renaming import uses_of
 from contextdb.errors import CellError, ContextDBError, Fault, in_quotes, plural, safe_text
-from contextdb.expressions.names import names_in as expression_names
+from contextdb.expressions.tokens import names_in as expression_names
 from contextdb.schema.outputs import declared_outputs, outputs_faults
 from contextdb.schema.sections import condition_to_dict, differences, has_place, settings_to_dict
 from contextdb.schema.settings import TableSettings, with_outputs

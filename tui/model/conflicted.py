@@ -13,8 +13,7 @@ from pathlib import Path
 from contextdb.disk import read_bytes, write_atomic
 from contextdb.edits.diffing.markers import names_of, versions_of
 from contextdb.errors import ContextDBError
-from contextdb.tables.merging.merging import Merge, merge
-from contextdb.tables.merging.reading import merged_bytes, table_of
+from contextdb.tables.merging.merging import Merge, merge, merged_bytes, table_of
 from contextdb.tables.project import schema_for, settings_of
 from contextdb.tables.table import Table
 

@@ -8,8 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextdb.cells.words import NUMBER_TEXT
 from contextdb.checks.rules import RULES
 from contextdb.covering import CoverageReport, Gap, Nearest, PairTable, Slice, format_percent
-from contextdb.covering.report import Crowd
-from contextdb.covering.shares import distinct_percents
+from contextdb.covering.report import Crowd, distinct_percents
 from contextdb.errors import plural
 from contextdb.findings import Finding
 from contextdb.report.coverage_words import histogram_lines

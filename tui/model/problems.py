@@ -10,9 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from contextdb.checks.cases import check_cases, read_cases
-from contextdb.checks.rows import check_rows
 from contextdb.checks.rules import RULES
-from contextdb.checks.run import check
+from contextdb.checks.run import check, check_rows
 from contextdb.covering.progress import Stops
 from contextdb.errors import ContextDBError, Fault, plural
 from contextdb.findings import LEVELS, Finding, Level

@@ -177,7 +177,6 @@ def _type(condition: Condition, choices: Choices | None) -> str:
 
 
 def _comment_of(condition: Condition) -> str:
-    """Type, name, bounds, unit and description of a condition."""
     domain = condition.domain
     low, high = domain.minimum, domain.maximum
     bounds = f"{_end(low, domain)}..{_end(high, domain)}" if math.isfinite(low) or math.isfinite(high) else ""

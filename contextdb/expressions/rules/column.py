@@ -15,7 +15,7 @@ from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
 from contextdb.errors import Fault, in_quotes, some
 from contextdb.expressions import Expression, ExpressionError, read_expression
-from contextdb.expressions.names import unknown_in
+from contextdb.expressions.tokens import unknown_in
 
 MOST_MENDS = 20
 """Rules of one column that get a mend when they cannot be read; looking for one is slow."""

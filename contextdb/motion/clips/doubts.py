@@ -66,7 +66,6 @@ class ClipFinding:
         return f"{self.file or self.asset}: {self.message}"
 
     def to_json(self) -> dict[str, Any]:
-        """The finding as plain data, every field in it."""
         return asdict(self)
 
 

@@ -50,7 +50,6 @@ class Footfalls:
         return tuple(self.down)
 
     def is_down(self, foot: str, time_s: float) -> bool:
-        """Whether the foot is down."""
         intervals = self._of(foot)
         return bool(((intervals[:, 0] <= time_s) & (time_s <= intervals[:, 1])).any())
 

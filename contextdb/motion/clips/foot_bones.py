@@ -120,7 +120,6 @@ class Rig:
 
     @classmethod
     def of(cls, clip: Clip) -> Rig:
-        """What a clip's skeleton shows."""
         skeleton = clip.skeleton
         names = skeleton.names
         first = Clip(clip.name, skeleton, clip.frame_time_s, clip.values[:1], clip.metres_per_unit, clip.up)

@@ -55,7 +55,6 @@ class Poses:
 
     @property
     def n_frames(self) -> int:
-        """How many frames there are."""
         return len(self.positions)
 
 

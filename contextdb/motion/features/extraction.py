@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from contextdb.cells.arguments import require_kind, require_whole
 from contextdb.errors import Fault, MotionError, Place, QueryError, in_quotes, mend_for, plural, some
-from contextdb.motion.clips import mirror, own_axes, quaternions
+from contextdb.motion.clips import mirror, quaternions
 from contextdb.motion.clips.clip import Clip
 from contextdb.motion.clips.contacts import three_rounds
 from contextdb.motion.clips.feet import NO_MARKS, ContactMarks, footfalls_of, phases, rounds_of
@@ -377,7 +377,7 @@ def _mirror_faults(skeleton: Skeleton, schema: FeatureSchema) -> Iterator[Fault]
     if fault is not None:
         yield fault
     turned = [channel.name for channel in schema.channels if channel.type in ("direction", "orientation")]
-    if turned and not own_axes.has_even_axes(skeleton, partners):
+    if turned and not mirror.has_even_axes(skeleton, partners):
         problem = f"the bones' own axes are not mirror images of each other, so channel {in_quotes(turned[0])} cannot be mirrored."
         yield Fault(problem, "position, velocity, angular velocity, trajectory and phase, or no mirroring of this clip")
 

@@ -26,8 +26,20 @@ from contextdb.motion.clips.poses import poses_of
 from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.clips.skeleton import Skeleton
 from contextdb.motion.clips.trajectory import Trajectory, root_trajectory, to_own_frame
-from contextdb.motion.made.body import SIDES, STEP_WIDTH_M, Manner, made_skeleton, made_values
-from contextdb.motion.made.steps import RATE, Change, Pace, Steps, about_turn, steps_of, timeline
+from contextdb.motion.made.body import (
+    RATE,
+    SIDES,
+    STEP_WIDTH_M,
+    Change,
+    Manner,
+    Pace,
+    Steps,
+    about_turn,
+    made_skeleton,
+    made_values,
+    steps_of,
+    timeline,
+)
 
 Gait = Literal["Idle", "Walk", "Run"]
 Style = Literal["normal", "tired"]
@@ -59,7 +71,6 @@ class MadeClip:
 
     @property
     def name(self) -> str:
-        """The clip's name."""
         return self.clip.name
 
 

@@ -102,7 +102,6 @@ class Marks:
 
     @property
     def n_kinds(self) -> int:
-        """How many kinds of frames there are."""
         return len(self.kind_marks)
 
     # ---- what a search asks, kind by kind

@@ -57,7 +57,6 @@ class ContextCoverage:
 
     @property
     def filled(self) -> dict[str, Bools]:
-        """Which bins are filled."""
         return {name: frames >= LEAST_FRAMES for name, frames in self.frames.items()}
 
     @property

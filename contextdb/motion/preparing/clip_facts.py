@@ -72,7 +72,6 @@ class Spread:
 
     @property
     def width(self) -> float:
-        """How far it reaches."""
         return self.high - self.low
 
 
@@ -100,7 +99,6 @@ class ClipFacts:
 
     @property
     def gait(self) -> str:
-        """The gait in which it moves, if it does."""
         return self.gaits[-1]
 
     def to_json(self) -> dict[str, Any]:
@@ -126,7 +124,6 @@ class Moments:
 
     @property
     def speeds(self) -> Floats:
-        """How fast the body goes over the ground."""
         return np.asarray(np.linalg.norm(self.velocities, axis=-1))
 
     @classmethod

@@ -57,7 +57,6 @@ class KeptClip:
     shape: Shape | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data; `KeptClip.of_json` reads it."""
         return {
             "key": self.key,
             "found": {kind: [each.to_json() for each in proposals] for kind, proposals in self.found.items()},
@@ -105,7 +104,6 @@ class ClipHead(Clip):
         self.__dict__.update(state | {"values": np.broadcast_to(state["values"], shape)})
 
     def to_json(self) -> dict[str, Any]:
-        """As plain data; `ClipHead.of_json` reads it."""
         rig = self.skeleton
         skeleton = [rig.names, rig.parents.tolist(), rig.offsets.tolist(), rig.channels, rig.end_sites]
         first = self.values[0].tolist()

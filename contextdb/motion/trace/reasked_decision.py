@@ -115,11 +115,9 @@ class ReaskedDecision:
         return self.with_searches({name: search.with_weights(weights) for name, search in self.searches.items()})
 
     def with_searches(self, searches: Mapping[str, ReaskedSearch]) -> ReaskedDecision:
-        """The same with other searches."""
         return replace(self, searches=searches)
 
     def with_threshold(self, database: str, threshold: float | None) -> ReaskedDecision:
-        """The same with another threshold."""
         entries = tuple(replace(each, threshold=threshold) if each.name == database else each for each in self.entries)
         return replace(self, entries=entries)
 

@@ -31,7 +31,6 @@ class Column:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no row has anything in it."""
         return not any(self.texts)
 
     @property

@@ -85,7 +85,6 @@ class Shared:
 
     @property
     def pair(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """The codes of the first two columns."""
         return self.codes[0], self.codes[1]
 
     @property

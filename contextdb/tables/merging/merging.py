@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Generic
 
 import numpy as np
@@ -20,8 +21,9 @@ from contextdb.cells.outputs import Output
 from contextdb.cells.words import says_any
 from contextdb.columns import TextColumn
 from contextdb.errors import safe_text
+from contextdb.files.texts import is_parquet, texts_of, written_over
 from contextdb.schema.sections import job_faults
-from contextdb.schema.settings import Schema, TableSettings, settings_renamed, with_outputs
+from contextdb.schema.settings import EMPTY, Schema, TableSettings, settings_renamed, with_outputs
 from contextdb.schema.table_settings import JOB_KEYS, JOBS
 from contextdb.tables.changes import CameFrom, Edit
 from contextdb.tables.data import AnyTable, TableData
@@ -271,3 +273,25 @@ def _distinct(names: Sequence[str]) -> list[str]:
         others = (name, *(f"{name} {i}" for i in range(2, len(names) + 2)))
         texts.append(next(n for n in others if n not in texts and (n == name or n not in names)))
     return texts
+
+
+# ---- tables from bytes whose file may have any name, as git hands them to a merge driver, and the bytes of a merge
+
+
+def table_of(
+    kind: type[AnyTable], raw: bytes, file: str, schema: Schema = EMPTY, settings: TableSettings | None = None
+) -> AnyTable:
+    """A table from bytes, CSV or Parquet as they are; `file` is its name in messages, `kind` the class to make.
+
+    Jobs of columns that this version of the table does not have yet are left out. Raises TableError where the bytes are not a
+    table.
+    """
+    source, columns = texts_of(raw, file, is_parquet(raw))
+    settings = settings_renamed(settings or TableSettings(Path(file).stem), {c.name: c.name for c in columns}.get)
+    return kind.build(settings.name, columns, schema, settings, Path(file), source)
+
+
+def merged_bytes(merge: Merge[AnyTable]) -> bytes:
+    """The bytes of a merge, written over those of ours: what theirs did not change stays, under a renamed column too."""
+    table, fields = merge.table, merge.fields.ours.tolist()
+    return written_over(table.source, table.columns, table.origin, fields).raw

@@ -14,8 +14,8 @@ from contextdb.cells.arguments import require_number, require_path, require_row,
 from contextdb.compiled.table import CompiledTable
 from contextdb.errors import ContextError, Fault, FileError, Place
 from contextdb.telemetry.link import doors
+from contextdb.telemetry.link.doors import require_name
 from contextdb.telemetry.link.feed import Decisions, Feed, Picked, Posed, Watcher, Who
-from contextdb.telemetry.link.folder import require_name
 from contextdb.telemetry.link.lines import cut_name
 from contextdb.telemetry.link.listeners import FileListener
 from contextdb.telemetry.link.watched import Watched, has_decisions

@@ -224,22 +224,22 @@ static void update(const cdbm_player *player, size_t n, const memory *own, const
     const cdb_schema *schema = player->n_tables > 0 ? &player->opened[0]->schema : NULL;
     int gait = schema ? cdb_condition_number(schema, "gait") : -1;
     const cdb_fact **lists = (const cdb_fact **)calloc(n * (player->n_tables + 1), sizeof *lists);
-    cdb_fact *facts = (cdb_fact *)calloc(n * 8, sizeof *facts);
+    cdb_fact *facts = (cdb_fact *)calloc(n * 16, sizeof *facts);
     size_t i, k, width = cdbm_state_width(player), n_joints = player->poses.rig.n_joints;
-    if (!lists || !facts || (schema && schema->n_conditions > 8)) exit(1);
+    if (!lists || !facts || (schema && schema->n_conditions > 16)) exit(1);
     memcpy(numbers, take(8, 2), sizeof numbers);
     n_entries = numbers[1], n_meetings = *(const int64_t *)take(8, 1);
     for (i = 0; i < n; i++) {
         memset(&inputs[i], 0, sizeof inputs[i]);
         memcpy(&inputs[i].goal, take(8, 3), sizeof inputs[i].goal);
         inputs[i].ground = numbers[0] == 2 ? stairs : numbers[0] ? slope : NULL;
-        for (k = 0; schema && k < schema->n_conditions; k++) facts[8 * i + k] = cdbi_missing(&schema->conditions[k]);
+        for (k = 0; schema && k < schema->n_conditions; k++) facts[16 * i + k] = cdbi_missing(&schema->conditions[k]);
         memcpy(&numbers[1], take(8, 1), 8);
-        if (gait >= 0) facts[8 * i + (size_t)gait].whole = numbers[1];
+        if (gait >= 0) facts[16 * i + (size_t)gait].whole = numbers[1];
         memcpy(&numbers[1], take(8, 1), 8);
         memcpy(&inputs[i].event_s, take(8, 1), 8);
         if (numbers[1] >= 0) inputs[i].event = events[numbers[1]];
-        lists[i * player->n_tables] = facts + 8 * i;
+        lists[i * player->n_tables] = facts + 16 * i;
         inputs[i].facts = lists + i * player->n_tables;
     }
     for (; n_meetings > 0; n_meetings--) meet(player, own, out);

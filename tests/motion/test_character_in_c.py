@@ -75,12 +75,16 @@ CAPTURED_MARKS = Markup.parse(
 )
 CAPTURED_GAITS = [{"run": "Run", "dash": "Run"}.get(name.split("_")[0], "Idle Walk") for name in CAPTURED]
 CAPTURED_COLUMNS = {"Asset Name": list(CAPTURED), "gait": CAPTURED_GAITS, "direction": ["Any"] * len(CAPTURED)}
-CONDITIONS = {"gait": {"type": "enum", "values": ["Idle", "Walk", "Run"]}, "direction": {"type": "angle", "hysteresis": 100.0}}
+CONDITIONS = {
+    "gait": {"type": "enum", "values": ["Idle", "Walk", "Run"]},
+    "direction": {"type": "angle", "hysteresis": 100.0, "mirror": "negate"},
+}
 OF_PLAYED = {
-    "LeftFoot.Down": {"type": "bool"},
+    "LeftFoot.Down": {"type": "bool", "mirror": {"Left": "Right"}},
+    "RightFoot.Down": {"type": "bool", "mirror": {"Left": "Right"}},
     "RightFoot.UntilDown_s": {"type": "number", "unit": "s"},
     "Playing.Speed": {"type": "number", "unit": "m/s", "hysteresis": 0.4},
-    "Playing.Turn": {"type": "number"},
+    "Playing.Turn": {"type": "number", "mirror": "negate"},
     "Playing.Phase": {"type": "number", "hysteresis": 0.15},
     "Playing.Tag.hit": {"type": "bool"},
 }
@@ -89,6 +93,7 @@ COLUMNS = {
     "gait": ["Idle", "Walk", "Walk", "Run", "Walk", "Idle Walk"],
     "direction": ["Any", "-40..40", "20..180", "-40..40", "Any", "Any"],
     "LeftFoot.Down": ["Any", "Any", "False ~0.4", "True ~0.3", "Any", "Any"],
+    "RightFoot.Down": ["Any", "Any", "Any", "False ~0.2", "Any", "Any"],
     "RightFoot.UntilDown_s": ["Any", "<0.2 ~0.5", "Any", "Any", ">=0.1 ~0.2", "Any"],
     "Playing.Speed": ["Any", "1..9 ~0.3/2", "Any", "<2.5 ~0.1/1", "Any", "Any"],
     "Playing.Turn": ["-5..5 ~0.2/20", "Any", "Any", "Any", "Any", "-20..20 ~0.1/9"],

@@ -51,6 +51,18 @@ def test_a_seed_that_is_none_is_no_state(at, number):
     assert not chooser.are_rows(row)
 
 
+def test_a_state_with_another_generator_is_refused_and_one_without_goes_on_with_its_own():
+    one = varying(places("abc"), Variation(0.1), 3)
+    played(one, 2)
+    before = one.state
+    for wrong in (random.Random(1).getstate(), (1,), (-1, 0), (1, 1 << 53), "12", (1.0, 2)):
+        with pytest.raises(ContextError, match="the rng of the state is no seed and count"):
+            one.restore(replace(before, rng=wrong))
+    assert one.state == before
+    one.restore(replace(before, rng=None))
+    assert one.state == before
+
+
 def test_a_seed_is_a_number_or_drawn_from_a_generator():
     def drawn(rng):
         return played(varying(places("pqrstuvw"), Variation(0.1), rng), 12)

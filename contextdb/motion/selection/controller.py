@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from contextdb.cells.arguments import as_number, require_kind
-from contextdb.errors import Fault, QueryError
+from contextdb.errors import ContextError, Fault, QueryError
 from contextdb.motion import arguments
 from contextdb.motion.arguments import Flags
 from contextdb.motion.clips.ground_place import GroundPlace, OfBody, place_of
@@ -51,7 +51,7 @@ from contextdb.motion.selection.decision import Decision, Playing, Recorder, Wat
 from contextdb.motion.selection.events import Event
 from contextdb.motion.selection.search_options import Among, OfPenalties, OfTags, OfValid, OfValidForMany, SearchOptions
 from contextdb.motion.selection.selector import Selector
-from contextdb.motion.selection.variation import Rng, seed_of
+from contextdb.motion.selection.variation import Rng, is_place, seed_of
 
 Clock = Callable[[], float]
 Place = tuple[Floats, int, Playing | None, bool]
@@ -246,6 +246,8 @@ class Controller:
         Raises ContextError for what is no state.
         """
         require_kind(state, ControllerState, "state", "a ControllerState, what `state` gives")
+        if not is_place(state.rng):
+            raise ContextError(Fault("the rng of the state is no seed and count.", "what `state` gives, or None"))
         self._stand(self.chooser, replace(state, rng=self._state.rng) if state.rng is None else state)
 
     def update(

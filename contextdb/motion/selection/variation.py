@@ -55,6 +55,13 @@ def seed_of(rng: Rng | int | None) -> int:
     return int(rng.random() * MOST_SEED)
 
 
+def is_place(rng: object) -> bool:
+    """Whether it is a seed and how often chance has decided, or None."""
+    if rng is None:
+        return True
+    return isinstance(rng, tuple) and len(rng) == 2 and all(isinstance(n, int) and 0 <= n < MOST_SEED for n in rng)
+
+
 def asset_keys(assets: Sequence[str]) -> Floats:
     """The numbers by which characters remember assets, the same in all databases: float64, whole and above 0."""
     hashes = (int.from_bytes(blake2b(asset.encode(errors="surrogatepass"), digest_size=8).digest(), "little") for asset in assets)

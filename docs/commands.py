@@ -21,9 +21,9 @@ from contextdb.cli import COMMANDS, Group
 PAGE = Path(__file__).parent / "commands.md"
 HEAD = """# Commands
 
-Every command, as `contextdb COMMAND --help` prints it, an option a line; what several commands have alike is written once.
-[Recipes](recipes.md) show the commands at work, [messages](messages.md) explain what they report, [ci](ci.md#exit-codes) lists
-exit codes. `make docs` writes this page.
+Every command with its arguments and options. `contextdb COMMAND --help` prints the same with more examples;
+[recipes](recipes.md) show commands at work, [messages](messages.md) explain what they report, [ci](ci.md#exit-codes) lists exit
+codes. `make docs` writes this page.
 
 Every command accepts:
 
@@ -31,7 +31,7 @@ Every command accepts:
 {common}
 ```
 
-Some accept these, as the last line of their section says:
+Several accept these, as the last line of their section says:
 
 ```text
 {shared}
@@ -39,6 +39,7 @@ Some accept these, as the last line of their section says:
 """
 OPTION = re.compile(r"\[-[^]|]*\] ?")
 """An optional argument of the usage that excludes no other one."""
+EXAMPLE = re.compile(r"(  |contextdb )\S")
 NAME = re.compile(r"--[\w-]+")
 WIDTH = 90
 """What the site shows of a line without cutting it."""
@@ -85,7 +86,8 @@ def _helps(group: Group) -> Iterator[tuple[str, str, list[str], list[str]]]:
         words = (*group.words, name)
         if hasattr(command, "COMMANDS"):
             inner = Group(words, command.COMMANDS, command.__doc__)
-            yield " ".join(words), _without_usage(inner.overview.partition("\ncommands:\n")[0].strip()), [], []
+            about = inner.overview.partition("\ncommands:\n")[0].partition("\noptions:\n")[0].strip()
+            yield " ".join(words), _shortened(about, 0), [], []
             yield from _helps(inner)
         else:
             parser = group.parser(name, command)
@@ -95,7 +97,7 @@ def _helps(group: Group) -> Iterator[tuple[str, str, list[str], list[str]]]:
                     if action.dest != "help":
                         lines[part.title in COMMON].append(_line(parser, action))
             text = parser.format_help().partition("\n\npositional arguments:")[0].partition("\n\noptions:")[0]
-            yield " ".join(words), _without_usage(text.strip()), *lines
+            yield " ".join(words), _shortened(text.strip(), 1), *lines
 
 
 def _line(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
@@ -105,10 +107,15 @@ def _line(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
     return textwrap.fill(line, WIDTH, subsequent_indent=22 * " ", break_on_hyphens=False)
 
 
-def _without_usage(text: str) -> str:
-    """A help whose usage names only what must be given."""
+def _shortened(text: str, n_examples: int) -> str:
+    """A help whose usage names only what must be given, with its first examples."""
     usage, _, rest = text.partition("\n\n")
-    return f"{' '.join(OPTION.sub('', f'{usage} ').split()).removeprefix('usage: ')}\n\n{rest}"
+    paragraphs = [f"{' '.join(OPTION.sub('', f'{usage} ').split()).removeprefix('usage: ')}"]
+    for paragraph in rest.split("\n\n"):
+        lines = paragraph.splitlines()
+        is_examples = lines[:1] and EXAMPLE.match(lines[0])
+        paragraphs.append("\n".join(lines[:n_examples] if is_examples else lines))
+    return "\n\n".join(filter(None, paragraphs))
 
 
 if __name__ == "__main__":

@@ -47,6 +47,28 @@ MANY = 5
 """Options that as many commands have alike are at the top."""
 COMMON = ("limits", "project")
 """The groups of options that every command has."""
+GUIDES = {
+    "cases": "ci.md#cases",
+    "ci": "ci.md#one-command-for-a-build",
+    "coverage": "ci.md#coverage",
+    "diff": "version-control.md#what-changed-contextdb-diff",
+    "live": "live.md#watch-it",
+    "merge": "version-control.md#two-people-one-table-contextdb-merge",
+    "motion bones": "choosing.md#checking-clips",
+    "motion build": "choosing.md#building",
+    "motion check": "choosing.md#checking-clips",
+    "motion coverage": "preparing.md#motion-coverage",
+    "motion debug": "sessions.md#see-why-the-debugger",
+    "motion describe": "preparing.md#a-table-from-clips",
+    "motion learn": "sessions.md#weights-from-choices",
+    "motion measure": "sessions.md#measuring-motion",
+    "motion prepare": "preparing.md#markup-from-clips",
+    "motion probe": "sessions.md#a-probe",
+    "motion replay": "sessions.md",
+    "motion run": "sessions.md",
+    "play": "playground.md",
+}
+"""Where a page says of a command what its help says after the first paragraph."""
 
 
 def page() -> str:
@@ -76,7 +98,8 @@ def _section(name: str, text: str, lines: list[str], owners: dict[str, list[str]
             own.append(line)
     body = "\n\n".join(part for part in (text, "\n".join(own)) if part)
     also = "; ".join(f"as {place} {', '.join(options)}" for place, options in sorted(elsewhere.items()))
-    return f"## contextdb {name}\n\n```text\n{body}\n```\n" + (f"\nAlso {also}.\n" if also else "")
+    more = [*([f"Also {also}."] if also else []), *([f"[More]({GUIDES[name]})."] if name in GUIDES else [])]
+    return f"## contextdb {name}\n\n```text\n{body}\n```\n" + (f"\n{' '.join(more)}\n" if more else "")
 
 
 def _helps(group: Group) -> Iterator[tuple[str, str, list[str], list[str]]]:
@@ -97,7 +120,7 @@ def _helps(group: Group) -> Iterator[tuple[str, str, list[str], list[str]]]:
                     if action.dest != "help":
                         lines[part.title in COMMON].append(_line(parser, action))
             text = parser.format_help().partition("\n\npositional arguments:")[0].partition("\n\noptions:")[0]
-            yield " ".join(words), _shortened(text.strip(), 1), *lines
+            yield " ".join(words), _shortened(text.strip(), 1, " ".join(words) in GUIDES), *lines
 
 
 def _line(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
@@ -107,15 +130,18 @@ def _line(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
     return textwrap.fill(line, WIDTH, subsequent_indent=22 * " ", break_on_hyphens=False)
 
 
-def _shortened(text: str, n_examples: int) -> str:
-    """A help whose usage names only what must be given, with its first examples."""
-    usage, _, rest = text.partition("\n\n")
-    paragraphs = [f"{' '.join(OPTION.sub('', f'{usage} ').split()).removeprefix('usage: ')}"]
-    for paragraph in rest.split("\n\n"):
+def _shortened(text: str, n_examples: int, is_guided: bool = False) -> str:
+    """A help with its first examples, whose usage names only what must be given; of one with a guide the first paragraph."""
+    usage, about, *rest = text.split("\n\n")
+    paragraphs = [f"{' '.join(OPTION.sub('', f'{usage} ').split()).removeprefix('usage: ')}", about]
+    for paragraph in rest:
         lines = paragraph.splitlines()
-        is_examples = lines[:1] and EXAMPLE.match(lines[0])
-        paragraphs.append("\n".join(lines[:n_examples] if is_examples else lines))
-    return "\n\n".join(filter(None, paragraphs))
+        if EXAMPLE.match(lines[0]):
+            paragraphs += ["\n".join(lines[:n_examples])] * (n_examples > 0)
+            n_examples = 0
+        elif not is_guided:
+            paragraphs.append(paragraph)
+    return "\n\n".join(paragraphs)
 
 
 if __name__ == "__main__":

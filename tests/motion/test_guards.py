@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import re
 from dataclasses import replace
 
 import pytest
@@ -11,6 +12,7 @@ import contextdb as cdb
 from contextdb.motion import Action, Controller, ControllerSettings, Entry, FeatureSchema, Selector, Trace
 from contextdb.motion.answers import NamedAssets
 from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.selection.guards import Held
 from contextdb.motion.trace.views import decision_lines, session_lines
 
 
@@ -205,3 +207,10 @@ def test_a_replay_shows_when_and_by_what_an_asset_was_held(recorded):
     assert "not valid" in lines[2]
     assert "plays on (cost bar)" in lines[2]
     assert "held by     cost bar" in [line.rstrip() for line in decision_lines(recorded[1])]
+
+
+def test_a_player_reads_what_a_jump_waits_for():
+    said = [held.waits for held in Held if held is not Held.NOTHING]
+    assert Held.NOTHING.waits == ""
+    assert len(set(said)) == len(said)
+    assert all(re.fullmatch(r"(No longer valid: it|Valid within) [\w ]+\.", sentence) for sentence in said)

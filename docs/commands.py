@@ -21,9 +21,8 @@ from contextdb.cli import COMMANDS, Group
 PAGE = Path(__file__).parent / "commands.md"
 HEAD = """# Commands
 
-Every command with its arguments and options. `contextdb COMMAND --help` prints the same with more examples;
-[recipes](recipes.md) show commands at work, [messages](messages.md) explain what they report, [ci](ci.md#exit-codes) lists exit
-codes. `make docs` writes this page.
+Every command with its options. `contextdb COMMAND --help` says more of each, [recipes](recipes.md) show them at work,
+[messages](messages.md) explain what they report, [ci](ci.md#exit-codes) lists exit codes.
 
 Every command accepts:
 
@@ -68,7 +67,7 @@ GUIDES = {
     "motion run": "sessions.md",
     "play": "playground.md",
 }
-"""Where a page says of a command what its help says after the first paragraph."""
+"""Where a page says of a command, and shows, what its help says after the first paragraph."""
 
 
 def page() -> str:
@@ -120,7 +119,8 @@ def _helps(group: Group) -> Iterator[tuple[str, str, list[str], list[str]]]:
                     if action.dest != "help":
                         lines[part.title in COMMON].append(_line(parser, action))
             text = parser.format_help().partition("\n\npositional arguments:")[0].partition("\n\noptions:")[0]
-            yield " ".join(words), _shortened(text.strip(), 1, " ".join(words) in GUIDES), *lines
+            has_guide = " ".join(words) in GUIDES
+            yield " ".join(words), _shortened(text.strip(), int(not has_guide), has_guide), *lines
 
 
 def _line(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
@@ -130,7 +130,7 @@ def _line(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
     return textwrap.fill(line, WIDTH, subsequent_indent=22 * " ", break_on_hyphens=False)
 
 
-def _shortened(text: str, n_examples: int, is_guided: bool = False) -> str:
+def _shortened(text: str, n_examples: int, has_guide: bool = False) -> str:
     """A help with its first examples, whose usage names only what must be given; of one with a guide the first paragraph."""
     usage, about, *rest = text.split("\n\n")
     paragraphs = [f"{' '.join(OPTION.sub('', f'{usage} ').split()).removeprefix('usage: ')}", about]
@@ -139,7 +139,7 @@ def _shortened(text: str, n_examples: int, is_guided: bool = False) -> str:
         if EXAMPLE.match(lines[0]):
             paragraphs += ["\n".join(lines[:n_examples])] * (n_examples > 0)
             n_examples = 0
-        elif not is_guided:
+        elif not has_guide:
             paragraphs.append(paragraph)
     return "\n\n".join(paragraphs)
 

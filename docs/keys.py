@@ -29,8 +29,7 @@ HEAD = """# Keys
 
 Every command of [the editor](editor.md): its keys, and its name for a [file of your own
 keys](editor.md#keys-and-colours-of-your-own). The first key of each works in every terminal, the others [where the terminal sends
-them](#what-terminals-send). A command without keys is in the palette (Ctrl+P) or in the toolbar; dialogs show theirs at the bottom.
-`python docs/keys.py` writes this page.
+them](#what-terminals-send). A command without keys is in the palette (Ctrl+P) or in the toolbar.
 """
 SECTIONS = {
     "While a cell is edited": ("CellEditor", "Entry"),

@@ -71,7 +71,9 @@ def _key(key: str, each: Setting) -> str:
 
 def _value(each: Setting, has_types: bool) -> str:
     words, bounds = each.shape.words, each.shape.bounds
-    sentences = [each.about, words and f"One of {_listed(words)}.", bounds and f"{bounds[0].upper()}{bounds[1:]}.", each.more]
+    is_said = all(f'"{word}"' in each.about for word in words)
+    one_of = "" if is_said else f"One of {_listed(words)}."
+    sentences = [each.about, one_of, bounds and f"{bounds[0].upper()}{bounds[1:]}.", each.more]
     types = has_types and each.types and f"Of type {_listed(each.types)}."
     without = each.without and each.without not in NOTHING and f"Default: {each.without}."
     return " ".join(sentence for sentence in (*sentences, types, without) if sentence)

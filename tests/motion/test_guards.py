@@ -148,7 +148,7 @@ def test_in_a_search_it_competes_as_what_plays_but_no_other_frame_of_it_does():
     one.update(DT, [0.0], moves.query({"speed": 1.0}))
     stays = one.update(DT, [1.0], moves.query({"speed": 2.25}))
     assert (stays.action, at(stays), stays.held, stays.continuing_cost) == (Action.CONTINUE, ("walk", 0.1), "hysteresis", 0.0)
-    assert stays.why == "A search was due: to play on costs 0, the least; walk is valid by hysteresis alone."
+    assert stays.why == "A search was due: playing on is cheapest, at cost 0; walk is valid by hysteresis alone."
     ((_, found),) = stays.candidates
     reasons = {row.frame: row.left_out for row in found if row.asset == "walk"}
     assert reasons.pop(1) is LeftOut.NO

@@ -209,7 +209,7 @@ SESSION = [
     decision(1, Action.NOTHING, "Nothing was playing, and nothing may play."),
     decision(2, Action.START, "Nothing was playing: walk at 0.40 s costs 0.04.", "walk", 12, 0.04),
     decision(3, Action.CONTINUE, "The next search is due in 0.1 s.", "walk", 15, searched=False),
-    decision(4, Action.CONTINUE, "A search was due: to play on costs 0.03, the least.", "walk", 18, 0.03, 0.03),
+    decision(4, Action.CONTINUE, "A search was due: playing on is cheapest, at cost 0.03.", "walk", 18, 0.03, 0.03),
     decision(5, Action.LOOP, "The next search is due in 0.1 s.", "walk", 1, searched=False),
     decision(6, Action.JUMP, "A search was due: jog at 1.00 s costs 0.2, playing on 3.", "jog", 30, 0.2, 3.0, WALK),
     decision(7, Action.CONTINUE, "The next search is due in 0.1 s.", "jog", 33, searched=False),

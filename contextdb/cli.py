@@ -65,6 +65,8 @@ class Parser(argparse.ArgumentParser):
             if text.startswith("-") and text not in self._option_string_actions and os.path.isfile(text):
                 fault = Fault(f"{in_quotes(text)} is a file, and looks like an option.", mend=in_quotes(os.path.join(".", text)))
                 self.error(fault.message)
+            if text not in self._option_string_actions and self._is_format(text):
+                self._refuse(text)
         arguments, rest = self.parse_known_intermixed_args([*given[:at], *(_PLAIN + text for text in given[at + 1 :])])
         for action in self._get_positional_actions():
             if action.nargs is None and not isinstance(getattr(arguments, action.dest), str):  # what "--" makes of none
@@ -72,11 +74,19 @@ class Parser(argparse.ArgumentParser):
         for text in rest:
             if not text.startswith("-"):
                 self.error(f"{in_quotes(text.removeprefix(_PLAIN))} is one argument too many.")
-            formats = self._option_string_actions.get("--format")
-            is_format = formats is not None and text[2:] in (formats.choices or ())
-            mend = in_quotes(f"--format {text[2:]}") if is_format else mend_for(text.partition("=")[0], self._option_string_actions)
-            self.error(Fault(f"there is no option {in_quotes(text)}.", mend=mend).message)
+            self._refuse(text)
         return arguments
+
+    def _is_format(self, text: str) -> bool:
+        """Whether an argument is "--" and the name of a format of the command."""
+        formats = self._option_string_actions.get("--format")
+        return formats is not None and text.startswith("--") and text[2:] in (formats.choices or ())
+
+    def _refuse(self, text: str) -> NoReturn:
+        """Refuse an option that there is not, and name what was meant."""
+        options = self._option_string_actions
+        mend = in_quotes(f"--format {text[2:]}") if self._is_format(text) else mend_for(text.partition("=")[0], options)
+        self.error(Fault(f"there is no option {in_quotes(text)}.", mend=mend).message)
 
     def _get_values(self, action: argparse.Action, arg_strings: list[str]) -> Any:
         return super()._get_values(action, [text.removeprefix(_PLAIN) for text in arg_strings])

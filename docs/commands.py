@@ -21,9 +21,8 @@ from contextdb.cli import COMMANDS, Group
 PAGE = Path(__file__).parent / "commands.md"
 HEAD = """# Commands
 
-Every command, as `contextdb COMMAND --help` prints it, an option a line; what several commands have alike is written once.
-[Recipes](recipes.md) show the commands at work, [messages](messages.md) explain what they report, [ci](ci.md#exit-codes) lists
-exit codes. `make docs` writes this page.
+Every command with its options. `contextdb COMMAND --help` says more of each, [recipes](recipes.md) show them at work,
+[messages](messages.md) explain what they report, [ci](ci.md#exit-codes) lists exit codes.
 
 Every command accepts:
 
@@ -31,7 +30,7 @@ Every command accepts:
 {common}
 ```
 
-Some accept these, as the last line of their section says:
+Several accept these, as the last line of their section says:
 
 ```text
 {shared}
@@ -39,6 +38,7 @@ Some accept these, as the last line of their section says:
 """
 OPTION = re.compile(r"\[-[^]|]*\] ?")
 """An optional argument of the usage that excludes no other one."""
+EXAMPLE = re.compile(r"(  |contextdb )\S")
 NAME = re.compile(r"--[\w-]+")
 WIDTH = 90
 """What the site shows of a line without cutting it."""
@@ -46,6 +46,28 @@ MANY = 5
 """Options that as many commands have alike are at the top."""
 COMMON = ("limits", "project")
 """The groups of options that every command has."""
+GUIDES = {
+    "cases": "ci.md#cases",
+    "ci": "ci.md#one-command-for-a-build",
+    "coverage": "ci.md#coverage",
+    "diff": "version-control.md#what-changed-contextdb-diff",
+    "live": "live.md#watch-it",
+    "merge": "version-control.md#two-people-one-table-contextdb-merge",
+    "motion bones": "choosing.md#checking-clips",
+    "motion build": "choosing.md#building",
+    "motion check": "choosing.md#checking-clips",
+    "motion coverage": "preparing.md#motion-coverage",
+    "motion debug": "sessions.md#see-why-the-debugger",
+    "motion describe": "preparing.md#a-table-from-clips",
+    "motion learn": "sessions.md#weights-from-choices",
+    "motion measure": "sessions.md#measuring-motion",
+    "motion prepare": "preparing.md#markup-from-clips",
+    "motion probe": "sessions.md#a-probe",
+    "motion replay": "sessions.md",
+    "motion run": "sessions.md",
+    "play": "playground.md",
+}
+"""Where a page says of a command, and shows, what its help says after the first paragraph."""
 
 
 def page() -> str:
@@ -75,7 +97,8 @@ def _section(name: str, text: str, lines: list[str], owners: dict[str, list[str]
             own.append(line)
     body = "\n\n".join(part for part in (text, "\n".join(own)) if part)
     also = "; ".join(f"as {place} {', '.join(options)}" for place, options in sorted(elsewhere.items()))
-    return f"## contextdb {name}\n\n```text\n{body}\n```\n" + (f"\nAlso {also}.\n" if also else "")
+    more = [*([f"Also {also}."] if also else []), *([f"[More]({GUIDES[name]})."] if name in GUIDES else [])]
+    return f"## contextdb {name}\n\n```text\n{body}\n```\n" + (f"\n{' '.join(more)}\n" if more else "")
 
 
 def _helps(group: Group) -> Iterator[tuple[str, str, list[str], list[str]]]:
@@ -85,7 +108,8 @@ def _helps(group: Group) -> Iterator[tuple[str, str, list[str], list[str]]]:
         words = (*group.words, name)
         if hasattr(command, "COMMANDS"):
             inner = Group(words, command.COMMANDS, command.__doc__)
-            yield " ".join(words), _without_usage(inner.overview.partition("\ncommands:\n")[0].strip()), [], []
+            about = inner.overview.partition("\ncommands:\n")[0].partition("\noptions:\n")[0].strip()
+            yield " ".join(words), _shortened(about, 0), [], []
             yield from _helps(inner)
         else:
             parser = group.parser(name, command)
@@ -95,7 +119,8 @@ def _helps(group: Group) -> Iterator[tuple[str, str, list[str], list[str]]]:
                     if action.dest != "help":
                         lines[part.title in COMMON].append(_line(parser, action))
             text = parser.format_help().partition("\n\npositional arguments:")[0].partition("\n\noptions:")[0]
-            yield " ".join(words), _without_usage(text.strip()), *lines
+            has_guide = " ".join(words) in GUIDES
+            yield " ".join(words), _shortened(text.strip(), int(not has_guide), has_guide), *lines
 
 
 def _line(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
@@ -105,10 +130,18 @@ def _line(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
     return textwrap.fill(line, WIDTH, subsequent_indent=22 * " ", break_on_hyphens=False)
 
 
-def _without_usage(text: str) -> str:
-    """A help whose usage names only what must be given."""
-    usage, _, rest = text.partition("\n\n")
-    return f"{' '.join(OPTION.sub('', f'{usage} ').split()).removeprefix('usage: ')}\n\n{rest}"
+def _shortened(text: str, n_examples: int, has_guide: bool = False) -> str:
+    """A help with its first examples, whose usage names only what must be given; of one with a guide the first paragraph."""
+    usage, about, *rest = text.split("\n\n")
+    paragraphs = [f"{' '.join(OPTION.sub('', f'{usage} ').split()).removeprefix('usage: ')}", about]
+    for paragraph in rest:
+        lines = paragraph.splitlines()
+        if EXAMPLE.match(lines[0]):
+            paragraphs += ["\n".join(lines[:n_examples])] * (n_examples > 0)
+            n_examples = 0
+        elif not has_guide:
+            paragraphs.append(paragraph)
+    return "\n\n".join(paragraphs)
 
 
 if __name__ == "__main__":

@@ -27,10 +27,9 @@ from tui.debug.keys import KEYS, names_of
 PAGE = Path(__file__).parent / "keys.md"
 HEAD = """# Keys
 
-Every command of [the editor](editor.md), with its keys, and its name for a
-[file of your own keys](editor.md#keys-and-colours-of-your-own). The first key of each command works in every terminal, the others
-[where the terminal sends them](#what-terminals-send). A command without keys is in the palette (Ctrl+P) or in the
-toolbar. A dialog shows its keys at the bottom. `python docs/keys.py` writes this page.
+Every command of [the editor](editor.md): its keys, and its name for a [file of your own
+keys](editor.md#keys-and-colours-of-your-own). The first key of each works in every terminal, the others [where the terminal sends
+them](#what-terminals-send). A command without keys is in the palette (Ctrl+P) or in the toolbar.
 """
 SECTIONS = {
     "While a cell is edited": ("CellEditor", "Entry"),
@@ -79,9 +78,8 @@ WORDS |= {"Del": "delete"} | {f"F{n}": f"f{n}" for n in range(1, 13)}
 SENT = """## What terminals send
 
 Keys that some terminal keeps for itself, or sends as another. *xterm* is also what tmux, screen and most terminals send; *kitty*
-is kitty's keyboard protocol, which the editor turns on where it is understood; *Windows* is Windows Terminal. `^A` is a control
-character. Kitty keeps most keys with Ctrl+Shift for itself, Windows Terminal, once its window is split, Alt and Alt+Shift with
-arrows.
+is kitty's keyboard protocol, which the editor turns on; *Windows* is Windows Terminal. `^A` is a control character. Kitty keeps
+most keys with Ctrl+Shift for itself, Windows Terminal, once its window is split, Alt and Alt+Shift with arrows.
 """
 SAME = {"Up", "Down", "Left", "Right", "Page up", "Page down", "First", "Last", "Cancel", "Close", "OK", "Choose"}
 """What keys do wherever they do anything: said once, with the keys of every list and dialog."""
@@ -93,7 +91,7 @@ WAYS = {
     "a page": ("page-up", "page-down"),
 }
 """The directions in which commands go and select: those of one kind stand on one line."""
-TABS = "## In tabs and dialogs\n\n| where | keys |\n| --- | --- |"
+TABS = "## In tabs and dialogs\n"
 
 
 def page() -> str:
@@ -164,7 +162,7 @@ def _section(group: str) -> str:
         if command.group == group:
             families.setdefault(_does(command), []).append(command)
     lines = [_line(does, family) for does, family in families.items()]
-    return "\n".join([f"## {group}", "", "| keys | name | does |", "| --- | --- | --- |", *lines, ""])
+    return "\n".join([f"## {group}", "", *lines, ""])
 
 
 def _does(command: Command) -> str:
@@ -178,10 +176,11 @@ def _does(command: Command) -> str:
 
 def _debugger() -> str:
     """The keys of the debugger, which have no names."""
-    lines = [f"| {_shown(key.keys)} | {key.about} |" for key in KEYS]
-    about = "Those of [the debugger](sessions.md#see-why-the-debugger)."
-    about += " The arrows up and down move the cursor of the pane that has the focus."
-    return "\n".join(["## In the debugger", "", about, "", "| keys | does |", "| --- | --- |", *lines, ""])
+    lines = [f"- {_shown(key.keys)}: {key.about}" for key in KEYS]
+    about = (
+        "Of [the debugger](sessions.md#see-why-the-debugger). Arrows up and down move the cursor of the pane that has the focus."
+    )
+    return "\n".join(["## In the debugger", "", about, "", *lines, ""])
 
 
 def _of_widgets(title: str, rows: list[tuple[str, str]]) -> str:
@@ -192,7 +191,7 @@ def _of_widgets(title: str, rows: list[tuple[str, str]]) -> str:
         if title in EVERYWHERE or about not in SAME:
             merged.setdefault(about, []).extend(terminals.name(key) for key in keys.split(","))
     parts = [f"**{', '.join(dict.fromkeys(names))}** {about}" for about, names in merged.items()]
-    return f"| {title} | {'; '.join(parts)} |" if parts else ""
+    return f"- {title}: {'; '.join(parts)}" if parts else ""
 
 
 def _sent() -> str:
@@ -206,7 +205,8 @@ def _shown(keys: str) -> str:
 
 def _line(does: str, family: list[Command]) -> str:
     keys = ", ".join(name for command in family for name in key_names(command.keys))
-    return f"| {keys} | {' '.join(f'`{command.id}`' for command in family)} | {does} |"
+    names = " ".join(f"`{command.id}`" for command in family)
+    return f"- **{keys}** {names}: {does}" if keys else f"- {names}: {does}"
 
 
 if __name__ == "__main__":

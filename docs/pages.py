@@ -1,5 +1,5 @@
-"""Take the pictures of the pages of coverage and of a session in docs/pages/, with any Chromium on the PATH: as wide as a desk, a
-tablet or a phone.
+"""Take the pictures of the pages of coverage and of a session in docs/pages/, with any Chromium on the PATH: as wide as a desk or a
+phone.
 
     python docs/pages.py
 
@@ -22,7 +22,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 SIZES = {"coverage-desk.png": (1200, 1100), "coverage-phone.png": (390, 844)}
 """Width and height in pixels."""
 MOTION_SIZES = {"motion-coverage-desk.png": (1200, 1150), "motion-coverage-phone.png": (390, 844)}
-SESSION_SIZES = {"session-desk.png": (1280, 900), "session-tablet.png": (820, 1100), "session-phone.png": (390, 844)}
+SESSION_SIZES = {"session-desk.png": (1280, 900), "session-phone.png": (390, 844)}
 STICK = """\
 time_s,x_mps,z_mps,gait,style
 0,0,0,Idle,normal

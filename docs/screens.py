@@ -29,7 +29,7 @@ from tui.app import EditorApp
 from tui.model.workspace import Workspace
 from tui.themes import DARK, LIGHT
 
-SMALL, LARGE = (80, 24), (160, 48)
+SMALL, WIDE, LARGE = (80, 24), (142, 28), (160, 48)
 MARGIN_PX = 10
 PAPERS = {DARK: ("#14171c", "#d6dae0"), LIGHT: ("#f2f4f7", "#1f2328"), "": ("#171717", "#dadada")}
 """Ground and text of the frame round a screen, by theme."""
@@ -226,6 +226,8 @@ def _all() -> Iterator[tuple[str, Scene]]:
             yield f"{name}-light.svg", replace(scene, theme=LIGHT)
         if name in _WITHOUT_COLOUR:
             yield f"{name}-without-colour.svg", replace(scene, has_colour=False)
+    sheet = replace(_SCENES["sheet"], size=WIDE)
+    yield from (("sheet-wide.svg", sheet), ("sheet-wide-light.svg", replace(sheet, theme=LIGHT)))
 
 
 SCENES: Mapping[str, Scene] = dict(_all())

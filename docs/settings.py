@@ -1,4 +1,4 @@
-"""Write the tables of settings in docs/format.md, out of their declarations.
+"""Write the lists of settings in docs/format.md, out of their declarations.
 
 python docs/settings.py
 """
@@ -40,7 +40,10 @@ DECLARED: dict[str, Settings] = {
     "controllers": CONTROLLER,
     "output": settings_of(PoseSettings),
 }
-"""The tables of the page. Each stands between `<!-- settings: NAME -->` and `<!-- end -->`."""
+"""The lists of the page. Each stands between `<!-- settings: NAME -->` and `<!-- end -->`."""
+
+NOTHING = ("none", "nothing", "no bound", "not declared", "not demanded", "nobody is named", "nothing is expected", "no rules")
+"""What holds without a setting, where that needs no word."""
 
 
 def page(text: str) -> str:
@@ -54,20 +57,26 @@ def page(text: str) -> str:
 
 
 def table(settings: Settings, has_types: bool = True) -> str:
-    """The table of some settings; `has_types` where it says to which types a key belongs, and not another page."""
-    rows = "".join(f"| `{key}` | {_value(each, has_types)} | {_usual(each)} |\n" for key, each in settings.items())
-    return f"\n| key | value | without it |\n| --- | --- | --- |\n{rows}\n"
+    """The list of some settings; `has_types` where it says to which types a key belongs, and not another page."""
+    rows = [f"- {_key(key, each)}: {_value(each, has_types)}\n" for key, each in settings.items()]
+    return f"\n{''.join(rows)}\n"
+
+
+def _key(key: str, each: Setting) -> str:
+    """The key, with its default where that can be written in the file."""
+    if each.is_required:
+        return f"`{key}`, {each.usual}"
+    return f"`{key}`" if each.without else f"`{key} = {each.usual}`"
 
 
 def _value(each: Setting, has_types: bool) -> str:
     words, bounds = each.shape.words, each.shape.bounds
-    sentences = [each.about, words and f"One of {_listed(words)}.", bounds and f"{bounds[0].upper()}{bounds[1:]}.", each.more]
+    is_said = all(f'"{word}"' in each.about for word in words)
+    one_of = "" if is_said else f"One of {_listed(words)}."
+    sentences = [each.about, one_of, bounds and f"{bounds[0].upper()}{bounds[1:]}.", each.more]
     types = has_types and each.types and f"Of type {_listed(each.types)}."
-    return " ".join(sentence for sentence in (*sentences, types) if sentence)
-
-
-def _usual(each: Setting) -> str:
-    return each.usual if each.without or each.is_required else f"`{each.usual}`"
+    without = each.without and each.without not in NOTHING and f"Default: {each.without}."
+    return " ".join(sentence for sentence in (*sentences, types, without) if sentence)
 
 
 def _listed(words: tuple[str, ...]) -> str:

@@ -1,6 +1,6 @@
 """docs/api.md is the interface: every name on it exists, every public name is on it, and its signatures are those of the code.
 
-`python tests/test_api.py --update` writes the signatures of the code into the first columns.
+`python tests/test_api.py --update` writes the signatures of the code into the lists.
 """
 
 import dataclasses
@@ -30,21 +30,21 @@ FORMS = (
     "Matches[0]",
     "Matches[1:]",
     "a & b",
-    "a \\| b",
+    "a | b",
     "a - b",
     "a ^ b",
     "many & other",
 )
 """Names on the page that are uses of a class, not attributes."""
 CODE = re.compile(r"`([^`]+)`")
-FIRST_CELL = re.compile(r"^\| (`.*?) \|", re.MULTILINE)
+FIRST_NAMES = re.compile(r"^- (`.*?): ", re.MULTILINE)
 NAME = re.compile(r"(\.?[\w.]+)(\(.*\))?")
 
 
 def names_in(text: str) -> Iterator[tuple[str, bool]]:
-    """The names in the first cells of the tables, in full, and whether each is written as a call."""
+    """The names that the lines of the lists begin with, in full, and whether each is written as a call."""
     owner = ""
-    for cell in FIRST_CELL.findall(text):
+    for cell in FIRST_NAMES.findall(text):
         for written in CODE.findall(cell):
             if written not in FORMS:
                 match = NAME.fullmatch(written)
@@ -110,7 +110,7 @@ def with_signatures(text: str) -> str:
         value = value_of(name)
         return f"`{found[1]}{signature_of(value)}`" if is_call(value) else match[0]
 
-    return FIRST_CELL.sub(lambda cell: CODE.sub(written, cell[0]), text)
+    return FIRST_NAMES.sub(lambda cell: CODE.sub(written, cell[0]), text)
 
 
 PAGE = API.read_text(encoding="utf-8")
@@ -148,9 +148,9 @@ def names_said_of(name: str) -> set[str]:
     """The names that the page has of a class: those of its own lines, and those in what its line says."""
     said = {full.removeprefix(f"{name}.") for full in NAMES if full.startswith(f"{name}.")}
     for line in PAGE.splitlines():
-        cells = line.split(" | ")
-        if name in CODE.findall(cells[0]):
-            said |= {found[1] for code in CODE.findall(" | ".join(cells[1:])) if (found := NAME.fullmatch(code))}
+        names, _, about = line.partition(": ")
+        if name in CODE.findall(names):
+            said |= {found[1] for code in CODE.findall(about) if (found := NAME.fullmatch(code))}
     return said
 
 

@@ -29,6 +29,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ("command", "said"),
     [
         ("coverage . --gap 1", '--gap and --explain are about one table, and there are 2. Accepted: one of "one", "two".'),
+        ("coverage --html", 'there is no option "--html". Did you mean "--format html"?'),
         ("coverage one.csv --explain walk", 'the asset "walk" is in 2 rows. Accepted: one of the rows 1, 2.'),
         ("coverage one.csv --telemetry t.parquet --scheduler tcp://x", "--scheduler is the address of Dask's."),
         ("query one.csv speed=1 --prefer distance", "there are no actors to choose from."),

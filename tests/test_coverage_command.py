@@ -14,6 +14,7 @@ from running import ROOT, Result, run
 
 from contextdb import cli
 from contextdb.files.reports import sealed, with_marks
+from contextdb.report.coverage_heat import NOTHING_COVERED
 from contextdb.report.render_json import as_json
 
 TOML = """
@@ -282,6 +283,17 @@ def test_the_json_of_the_sample_tables_is_what_the_page_holds(monkeypatch: pytes
     squares = re.findall(r'aria-label="([^"]+)">([^<]+)</button>', page)
     assert squares
     assert all(said.startswith(seen) for said, seen in squares), "a square is named otherwise than it shows"
+
+
+def test_a_page_cuts_no_name_of_its_maps_and_shows_no_map_that_is_0_everywhere(here: Path):
+    write("Asset,air,landed\nfall,True,True\n")
+    page = run("coverage", "tables", "--format", "html").out
+    assert NOTHING_COVERED in page
+    assert 'class="heat"' not in page
+    write("Asset,air,landed\nfall,True,True\nwalk,False,False\n")
+    page = run("coverage", "tables", "--format", "html").out
+    assert 'class="heat"' in page
+    assert "ellipsis" not in page
 
 
 def test_the_report_is_the_same_to_the_byte_on_one_core_and_on_four(here: Path):

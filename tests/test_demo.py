@@ -2,6 +2,8 @@
 
 import errno
 import re
+import sys
+from pathlib import Path
 
 import pytest
 from running import run
@@ -13,6 +15,7 @@ from contextdb.commands.demo_command import (
     RISE_M,
     SLOPE_M,
     STAIRS_M,
+    _next,
     cast_lines,
     ground,
     players,
@@ -103,3 +106,18 @@ def test_the_world_has_stairs_a_landing_and_a_slope_down():
 def test_it_prints_the_cast_between_the_first_answer_and_the_search():
     out = run("demo").out
     assert out.index("3. A ball in the air") < out.index("Defender is Marsh") < out.index("4. Clips") < out.index("7. The same")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a script has another name there")
+def test_it_ends_with_a_command_that_is_where_it_says(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    script = tmp_path / "bin" / "contextdb"
+    script.parent.mkdir()
+    script.touch(0o755)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.executable", str(tmp_path / "bin" / "python"))
+    monkeypatch.setenv("PATH", str(script.parent))
+    assert _next("game") == 'Next: "contextdb edit game" opens the tables.'
+    monkeypatch.setenv("PATH", "")
+    assert _next("game") == f'Next: "{Path("bin", "contextdb")} edit game" opens the tables.'
+    script.unlink()
+    assert _next(None).startswith(f'Next: "{Path("bin", "python")} -m contextdb demo --keep FOLDER" writes these tables')

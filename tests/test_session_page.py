@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import zlib
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -243,3 +244,23 @@ def test_the_page_plays_by_itself_to_its_end(page: str, here: Path):
     seen = dumped(played.as_uri(), 20_000)
     assert f'<span id="clock">{last["time_s"]:.2f} s of {last["time_s"]:.2f} s' in seen
     assert f"{last['playing']['asset']} at {last['playing']['time_s']:.2f} s" in seen
+
+
+@pytest.mark.skipif(BROWSER is None, reason="there is no Chromium here")
+def test_the_timeline_writes_names_whole_and_over_no_other(page: str, here: Path):
+    noted = """const drawn = []; const pens = CanvasRenderingContext2D.prototype; const fill = pens.fillText;
+    pens.fillText = function (text, x, y) { drawn.push([text, x, y, this.measureText(text).width]); fill.call(this, text, x, y); };
+    pens.clip = () => drawn.push(["cut"]);
+    setTimeout(() => (document.title = JSON.stringify(drawn)), 500);"""
+    (here / "noted.html").write_text(page.replace("<script>\n", f"<script>\n{noted}\n", 1), encoding="utf-8")
+    title = re.search(r"<title>(.*?)</title>", dumped(f"{(here / 'noted.html').as_uri()}#t=0"), re.DOTALL)
+    assert title
+    drawn = json.loads(html.unescape(title[1]))
+    assert ["cut"] not in drawn
+    session = document_in(page)["sessions"][0]
+    names = [each for each in drawn if each[0] in session["assets"]]
+    assert {session["assets"][i] for i in values_of(session["columns"]["asset"]) if i >= 0} <= {name for name, *_ in names}
+    for y in {y for _, _, y, _ in names}:
+        ends = [(at, at + width) for _, at, at_y, width in names if at_y == y]
+        lines = sorted(set(ends))
+        assert all(end <= start for (_, end), (start, _) in pairwise(lines))

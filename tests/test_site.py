@@ -156,11 +156,49 @@ def test_the_site_and_its_first_page_are_small():
     assert sum(sizes.values()) < 300_000
 
 
+# ---- in a browser
+
+
+BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
+MEASURED = """<script>addEventListener("load", () => {{
+  const sides = (name) => {{ const box = document.querySelector(name).getBoundingClientRect(); return [box.left, box.right]; }};
+  const lists = [sides(".sidebar-tree"), sides(".toc-tree")];
+  parent.postMessage(JSON.stringify([innerWidth, document.documentElement.scrollWidth, ...lists]), "*");
+}});</script></body>"""
+
+
+def seen_in(page: Path, width: int, milliseconds: int = 5000) -> str:
+    """What a page posts to the frame that it is in, in a browser."""
+    assert BROWSER
+    frame = page.with_name("frame.html")
+    frame.write_text(FRAME.format(page=page.name, width=width), encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files"]
+    command = [BROWSER, *options, f"--virtual-time-budget={milliseconds}", "--dump-dom", frame.as_uri()]
+    seen = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", timeout=120, check=True).stdout
+    found = re.search(r"<pre>(.+?)</pre>", seen, re.DOTALL)
+    assert found, "the page did not answer"
+    return found[1]
+
+
+@made
+@pytest.mark.skipif(not BROWSER, reason="there is no Chromium here")
+@pytest.mark.parametrize("name", ["designers", "format", "names-contextdb", "index"])
+def test_a_page_of_1280_pixels_has_both_lists_and_one_of_390_does_not_scroll_aside(name: str, tmp_path: Path):
+    copy = Path(shutil.copytree(SITE, tmp_path / "site"))
+    page = copy / "measured.html"
+    page.write_text((SITE / f"{name}.html").read_text("utf-8").replace("</body>", MEASURED.format()), encoding="utf-8")
+    width, scrolled, (left, _), (_, right) = json.loads(seen_in(page, 1280))
+    assert scrolled <= width
+    assert left < 40
+    assert 0 < right <= width
+    width, scrolled, *_ = json.loads(seen_in(page, 390))
+    assert scrolled <= width
+
+
 # ---- axe, where it is
 
 
 AXE = os.environ.get("AXE", "")
-BROWSER = next((found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))), None)
 ASK = """<script>document.body.dataset.theme = "{theme}";</script><script src="{axe}"></script><script>
 addEventListener("load", () => axe.run(document, {{resultTypes: ["violations"]}}).then(
   (told) => parent.postMessage(JSON.stringify(told.violations.map((each) => [each.impact, each.id])), "*")));
@@ -175,15 +213,9 @@ FRAME = """<iframe src="{page}" style="width: {width}px; height: 900px"></iframe
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("name", ["index", "format", "recipes", "names-motion"])
 def test_axe_finds_nothing_serious(name: str, theme: str, width: int, tmp_path: Path):
-    assert BROWSER
     copy = Path(shutil.copytree(SITE, tmp_path / "site"))
     text = (SITE / f"{name}.html").read_text(encoding="utf-8")
     asked = ASK.format(theme=theme, axe=Path(AXE).resolve().as_uri())
     (copy / "asked.html").write_text(text.replace("</body>", asked), encoding="utf-8")
-    (copy / "frame.html").write_text(FRAME.format(page="asked.html", width=width), encoding="utf-8")
-    options = ["--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files", "--virtual-time-budget=20000"]
-    command = [BROWSER, *options, "--dump-dom", (copy / "frame.html").as_uri()]
-    seen = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", timeout=120, check=True).stdout
-    found = re.search(r"<pre>(.+?)</pre>", seen, re.DOTALL)
-    assert found, "axe did not answer"
-    assert [each for each in json.loads(found[1]) if each[0] in ("serious", "critical")] == []
+    found = seen_in(copy / "asked.html", width, 20_000)
+    assert [each for each in json.loads(found) if each[0] in ("serious", "critical")] == []

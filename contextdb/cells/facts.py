@@ -54,7 +54,7 @@ class FactSet:
 
 
 def cell(text: str) -> FactSet:
-    """A fact that may be any of a set of values, written like a cell: `query({"heading": cell("0 ± 90")})`.
+    """A fact that is a set of values, written like a cell: `query({"heading": cell("0 ± 90")})`.
 
     Raises ContextError for what is no text. The text is read by the query, which raises ContextError where it cannot be.
     """

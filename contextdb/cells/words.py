@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from functools import lru_cache
@@ -16,6 +17,8 @@ MARK = "@"
 _NAME = re.compile(r"[\w.:/\-]+")
 _RESERVED = re.compile(rf"any|not|-|nan|{NUMBER_TEXT}", re.IGNORECASE)
 _SLOT = re.compile(r'"((?:[^"]|"")*)"|[^\s,;|"]+')
+_LONG = re.compile(r"-?\d+\.\d{4,}|-?\d(?:\.\d+)?e-\d+")
+_ZERO = 1e-9
 _TRUTH = {"true": True, "t": True, "yes": True, "1": True, "false": False, "f": False, "no": False, "0": False}
 
 
@@ -62,6 +65,18 @@ def format_number(value: float) -> str:
     value += 0.0  # -0.0 is 0
     short = f"{value:.15g}"
     return short if float(short) == value and "e" not in short else repr(value).removesuffix(".0")
+
+
+def three_digits(text: str) -> str:
+    """A number of many decimals, as a game sends them, with three digits that count; any other text as it is."""
+    if not _LONG.fullmatch(text):
+        return text
+    number = float(text)
+    if abs(number) < _ZERO:
+        return "0"
+    places = max(2 - math.floor(math.log10(abs(number))), 0)
+    short = f"{number:.{places}f}"
+    return short.rstrip("0").rstrip(".") if "." in short else short
 
 
 def truth_of(text: str) -> bool | None:

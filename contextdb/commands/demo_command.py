@@ -85,7 +85,18 @@ def run(arguments: argparse.Namespace) -> ExitCode:
         with output():
             for line in _steps(folder, page):
                 print(styled(line, "bold", colour) if line[:1].isdigit() else line)
+            print(_next(arguments.keep))
     return ExitCode.OK
+
+
+def _next(kept: str | None) -> str:
+    """What to do next, with the command as a terminal here finds it."""
+    beside = shutil.which("contextdb", path=os.path.dirname(sys.executable))
+    command = "contextdb" if shutil.which("contextdb") else beside or f"{sys.executable} -m contextdb"
+    command = command.removeprefix(os.getcwd() + os.sep)
+    if kept is not None:
+        return f'Next: "{command} edit {kept}" opens the tables.'
+    return f'Next: "{command} demo --keep FOLDER" writes these tables and clips, "{command} edit FOLDER" opens them.'
 
 
 def make_sample(source: Path, folder: Path) -> None:
@@ -193,7 +204,6 @@ def _motion(project: Project, folder: Path, page: Path | None) -> Iterator[str]:
         yield f"   {sentence}"
         yield f"   {page}"
         yield ""
-    yield 'Next: "contextdb query --help", and docs/tutorial.md.'
 
 
 @dataclass(frozen=True)

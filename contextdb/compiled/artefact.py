@@ -11,8 +11,11 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     once                   bool [R]              where rows are played once at most
     cooldown_s             float64 [R]           where rows rest for seconds
     cooldown_turns         int64 [R]             where rows rest for picks
-    CCC.FIELD              as in contextdb.compiled.classes, for condition number CCC: `masks` (and `bounds`), or `low`, `high`,
-    `any_mask` CCC.codes              int32 [R]             which of the distinct texts each row holds
+    declared               uint8                 JSON list of the project's conditions: a fact of such a name is no typo
+    CCC.FIELD              of condition number CCC, from 000 in the order of `about`; see contextdb.compiled.classes:
+                           masks uint64 [n, W], of numbers also bounds float64 [K - 1], ascending; or, of very many bounds,
+                           low and high uint64 [L, 2 G + F, W] and any_mask uint64 [W]
+    CCC.codes              int32 [R]             which of the distinct texts each row holds
     CCC.texts              uint8                 JSON list of the distinct texts
     CCC.hysteresis         float64 [1]           where the condition has one
     slots.CCC.codes        as CCC.codes and CCC.texts, for the columns of slots, named in `about`
@@ -21,7 +24,9 @@ Tensors, R rows, W = ceil(R / 64) words, C conditions; every integer and double 
     outputs.CCC.values     output CCC, of bool, int, number: uint8 (0 or 1), int64, float64 [R + 1]; numbers: float64 [R + 1, size]
     outputs.CCC.codes      int32 [R + 1]         of enum and text: which of the texts
     outputs.CCC.texts      uint8                 JSON list; of an enum its values in their order, then "" for none
-    outputs.plays          float64 [R + 1, 8]    how rows play, see contextdb.cells.row_play; with a reserved output only
+    outputs.plays          float64 [R + 1, 8]    how rows play, with a reserved output only: blend_s, start_s, the least and the
+                           greatest play_rate, then as numbers mirror (as asked, always, never), loop, root (animation, code,
+                           mixed, path) and until (natural, any); NaN where the row says nothing. See contextdb.cells.row_play
     when.codes             as CCC.codes and CCC.texts, for the column of rules, named in `about`
     when.texts
     CCC.soft.FIELD         the same for soft cells, and CCC.soft.penalties float64 [R]
@@ -58,7 +63,23 @@ The metadata hold `contextdb` (the version of this layout), `about` (JSON: name,
 column; where facts are derived also the conditions that they are computed from; where rows have rules also their column and the
 conditions that they name and that are not columns) and `digest`, BLAKE2b-128 of `about` and of all
 tensors in the order of their names. Opening checks all of it. `about` names the policy of each table and says how
-it picks, so that a reader needs no names: `choose` and `by_cost` (`contextdb.schema.policies`).
+it picks, so that a reader needs no names: `choose` among the rows of the highest rank ("chance", "top", where each row has a rank
+of its own, "refuse") and `by_cost`, only those whose soft cells cost least (`contextdb.schema.policies`).
+
+The `kind` of a column says which mask a fact has; the last one is for a missing fact:
+
+    value     masks[i] for the fact that is values[i]; with `has_others` any other text has the mask after those
+    number    masks[k], k the number of bounds that are not above the fact; an angle is first wrapped to -180 up to, without, 180
+    wide      with that k, g = k >> shift, f = k & (2 ** shift - 1), F = 2 ** shift: the union over the L layers of
+              (low[g] | low[G + g] & low[2 G + f]) & (high[g] | high[G + g] & high[2 G + f]); `any_mask` for a missing fact
+    tags      three masks (no, yes, missing) for each of `tags` and then of `negated`: the intersection of masks[3 s + answer] over
+              all slots s. A fact has a tag when it holds the tag or one below it. A slot of `negated` is [needs, bans], yes unless
+              the fact has all of `needs` and none of `bans`; or, where cells of nested tables meet, a list of parts [needs, bans,
+              is_complement], yes when the fact is in every part
+
+An answer is the intersection of `enabled` and the masks of all facts. With `computed_from` in `about` conditions are derived from
+other facts by the `expr` stored with them; with `when` only rows count whose rule is true, too; with `ways` the masks are of
+the flat rows. A reader refuses a file whose `about` has a key that it does not know.
 """
 
 from __future__ import annotations

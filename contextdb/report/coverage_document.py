@@ -143,7 +143,13 @@ def _gaps(measured: Measured, most: int, is_page: bool) -> Rows:
         rows.append(Row((words.gap_sentence(measured, gap, sys.maxsize if is_page else words.MOST_TOLD),), sizes))
     n_more = len(report.gaps) - len(rows)
     more = f"… and {n_more:,} more; --gap N shows one in full, --all lists them" if n_more else ""
-    head = ("", "share", *moments, *(["in no gap above"] if is_page else []), "contexts without a valid row, and what would play")
+    head = (
+        "",
+        "share",
+        *moments,
+        *(["without those above"] if is_page else []),
+        "contexts without a valid row, and what would play",
+    )
     return Rows(words.gaps_sentence(report), rows, head, more)
 
 

@@ -14,6 +14,8 @@ MOST_CONDITIONS = 24
 """The most conditions in the map: those whose own values are covered least."""
 FEW_SAMPLES = 50
 MOST_TOLD = 5
+NOTHING_COVERED = "Pairs of conditions: of any two, some combination of values has no valid row at all."
+"""Instead of a map that is 0 everywhere."""
 EDGES = (0.1, 0.25, 0.5, 0.75, 0.9, 1.0)
 """Colours change at these shares."""
 
@@ -28,6 +30,8 @@ def heat_map(pairs: PairTable, number: int) -> str:
         order.sort(key=lambda at: (1.0 if (w := worst[at]) is None or w.covered is None else w.covered, at))
         order = sorted(order[:MOST_CONDITIONS])
     squares = [(one, other) for i, one in enumerate(order) for other in order[: i + 1]]
+    if all((least := pairs.worst(*square)) is not None and least.covered == 0.0 for square in squares):
+        return f'<p class="muted">{NOTHING_COVERED}</p>\n'
     named = [escape(printable(pairs.conditions[at])) for at in order]
     head = "".join(f'<th scope="col"><div title="{name}">{name}</div></th>' for name in named)
     rows, k = [], 0

@@ -189,6 +189,7 @@ function drawStage(lane) {
 // ---- the timeline
 
 const BAND = 22;
+const NAMES = 28; // two lines below the band, for names that are wider than their stretch of it
 const STRIP = 30;
 
 function range() {
@@ -207,28 +208,34 @@ function drawTimeline(lane) {
   const x = (time) => ((time - from) / (to - from)) * width;
   const [first, last] = [frameOf(session, from), frameOf(session, to)];
   pen.font = "12px system-ui, sans-serif";
-  band(pen, session, x, first, last);
-  stripsOf(session).forEach((one, k) => strip(pen, session, one, x, first, last, BAND + 14 + k * STRIP, width));
+  band(pen, session, x, first, last, width);
+  stripsOf(session).forEach((one, k) => strip(pen, session, one, x, first, last, BAND + NAMES + 14 + k * STRIP, width));
   pen.fillStyle = colour("text");
   pen.fillRect(x(view.at) - 1, 0, 2, timeline.getBoundingClientRect().height);
 }
 
-function band(pen, session, x, first, last) {
+function band(pen, session, x, first, last, width) {
   const { asset, flags } = session.columns;
+  const full = [0, 0]; // how far each line of names is full
   for (let i = first; i <= last; ) {
     let end = i + 1;
     while (end <= last && asset[end] === asset[i] && !(flags[end] & 2)) end++;
     const [left, right] = [x(timeOf(session, i)), x(timeOf(session, end))];
     pen.fillStyle = colourOf(asset[i]);
     pen.fillRect(left, 0, Math.max(1, right - left - 1), BAND);
-    if (right - left > 40 && asset[i] >= 0) {
-      pen.save();
-      pen.beginPath();
-      pen.rect(left, 0, right - left - 4, BAND);
-      pen.clip();
-      pen.fillStyle = "#fff";
-      pen.fillText(session.assets[asset[i]], left + 4, 15);
-      pen.restore();
+    if (asset[i] >= 0) {
+      const name = session.assets[asset[i]];
+      const wide = pen.measureText(name).width;
+      const at = Math.max(0, Math.min(left, width - wide));
+      if (wide + 8 <= right - Math.max(0, left)) {
+        pen.fillStyle = "#fff";
+        pen.fillText(name, Math.max(0, left) + 4, 15);
+      } else {
+        const n = full.findIndex((end) => at >= end);
+        pen.fillStyle = colour("text");
+        if (n >= 0) pen.fillText(name, at, BAND + 20 + 13 * n);
+        if (n >= 0) full[n] = at + wide + 10;
+      }
     }
     i = end;
   }
@@ -480,7 +487,7 @@ function drags(canvas, onMove) {
 function laneOf(session, number) {
   const lane = { session, moment: null, isWritten: false, filter: "", order: "best" };
   for (const [key, id] of Object.entries({ canvas: "stage", timeline: "timeline", says: "says", why: "why" })) lane[key] = $(`${id}${number}`);
-  lane.timeline.style.height = `${BAND + 16 + stripsOf(session).length * STRIP}px`;
+  lane.timeline.style.height = `${BAND + NAMES + 16 + stripsOf(session).length * STRIP}px`;
   drags(lane.canvas, (event, isFirst) => {
     if (isFirst) return;
     view.yaw -= event.movementX * 0.01;

@@ -81,9 +81,9 @@ def topics(where: str) -> dict[str, list[str]]:
 
 
 def _heading(name: str) -> str:
-    """The first section of docs/api.md whose tables list a name."""
+    """The first section of docs/api.md whose lists have a name."""
     parts = _HEADINGS.split(API)
-    listed = re.compile(rf"(?m)^\|[^|]*`{name}\b")
+    listed = re.compile(rf"(?m)^- (?:(?!: ).)*`{name}\b")
     return next((heading for heading, text in zip(parts[1::2], parts[2::2], strict=True) if listed.search(text)), "More")
 
 

@@ -231,7 +231,7 @@ def test_what_plays_plays_on_while_it_is_a_near_tie():
     one.update(DT, [0.0], valid("q"))
     decisions = [one.update(DT, [0.0]) for _ in range(8)]
     assert [decision.action for decision in decisions] == [Action.CONTINUE] * 8
-    assert decisions[0].why == "A search was due: to play on costs 0.01, about as little as the best, 0."
+    assert decisions[0].why == "A search was due: playing on, at cost 0.01, is about as cheap as the best, 0."
 
 
 def test_variation_keeps_to_what_is_under_the_threshold_that_let_its_database_win():
@@ -337,7 +337,7 @@ def test_what_was_entered_just_now_is_left_for_a_large_gain_alone_and_says_so():
     held = one.update(DT, [3.0])
     assert (held.playing.asset, held.action, held.continuing_cost) == ("walk", Action.CONTINUE, 4.0)
     assert held.why == (
-        "A search was due: to play on costs 4; the best, 0, is too little less to leave it 0.10 s after it was entered."
+        "A search was due: playing on costs 4; the best, 0, is not cheap enough to leave it 0.10 s after it was entered."
     )
     later = [one.update(DT, [float(tick)]) for tick in range(2, 10)][-1]
     assert later.playing.asset == "walk"

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import re
 from dataclasses import replace
 
 import pytest
@@ -11,6 +12,7 @@ import contextdb as cdb
 from contextdb.motion import Action, Controller, ControllerSettings, Entry, FeatureSchema, Selector, Trace
 from contextdb.motion.answers import NamedAssets
 from contextdb.motion.markup.left_out import LeftOut
+from contextdb.motion.selection.guards import Held
 from contextdb.motion.trace.views import decision_lines, session_lines
 
 
@@ -146,7 +148,7 @@ def test_in_a_search_it_competes_as_what_plays_but_no_other_frame_of_it_does():
     one.update(DT, [0.0], moves.query({"speed": 1.0}))
     stays = one.update(DT, [1.0], moves.query({"speed": 2.25}))
     assert (stays.action, at(stays), stays.held, stays.continuing_cost) == (Action.CONTINUE, ("walk", 0.1), "hysteresis", 0.0)
-    assert stays.why == "A search was due: to play on costs 0, the least; walk is valid by hysteresis alone."
+    assert stays.why == "A search was due: playing on is cheapest, at cost 0; walk is valid by hysteresis alone."
     ((_, found),) = stays.candidates
     reasons = {row.frame: row.left_out for row in found if row.asset == "walk"}
     assert reasons.pop(1) is LeftOut.NO
@@ -205,3 +207,10 @@ def test_a_replay_shows_when_and_by_what_an_asset_was_held(recorded):
     assert "not valid" in lines[2]
     assert "plays on (cost bar)" in lines[2]
     assert "held by     cost bar" in [line.rstrip() for line in decision_lines(recorded[1])]
+
+
+def test_a_player_reads_what_a_jump_waits_for():
+    said = [held.waits for held in Held if held is not Held.NOTHING]
+    assert Held.NOTHING.waits == ""
+    assert len(set(said)) == len(said)
+    assert all(re.fullmatch(r"(No longer valid: it|Valid within) [\w ]+\.", sentence) for sentence in said)

@@ -21,7 +21,7 @@ from contextdb.motion.selection.root_motion import RootMotion
 from contextdb.motion.selection.trigger import Trigger
 from contextdb.motion.trace.cost_views import Ranked, View, candidate_lines, cost_text
 from contextdb.motion.trace.text_table import Column, shortened, table_lines
-from contextdb.motion.trace.views import decision_lines, session_lines, summary_line
+from contextdb.motion.trace.views import decision_lines, fact_text, session_lines, summary_line
 
 CHANNELS = ("LeftFoot position", "Hips velocity", "trajectory position at 0.33 0.67 1 s")
 
@@ -59,7 +59,7 @@ JUMP = Decision(
             Search("loco", None, Hit("jog", 0, 45, 0.75), Status.WINNER),
         ),
     ),
-    context={"gait": "Run", "speed": 2.5, "Stunned": False, "tags": ["InAir", "Ball"], "height": None},
+    context={"gait": "Run", "speed": 2.5019378, "Stunned": False, "tags": ["InAir", "Ball"], "height": None},
     candidates=(
         ("tired", found(candidate("walk_tired", 1204, (1.0, 1.5, 1.0), mirrored=True), NOT_VALID=1200, CLIP_END=9)),
         (
@@ -209,7 +209,7 @@ SESSION = [
     decision(1, Action.NOTHING, "Nothing was playing, and nothing may play."),
     decision(2, Action.START, "Nothing was playing: walk at 0.40 s costs 0.04.", "walk", 12, 0.04),
     decision(3, Action.CONTINUE, "The next search is due in 0.1 s.", "walk", 15, searched=False),
-    decision(4, Action.CONTINUE, "A search was due: to play on costs 0.03, the least.", "walk", 18, 0.03, 0.03),
+    decision(4, Action.CONTINUE, "A search was due: playing on is cheapest, at cost 0.03.", "walk", 18, 0.03, 0.03),
     decision(5, Action.LOOP, "The next search is due in 0.1 s.", "walk", 1, searched=False),
     decision(6, Action.JUMP, "A search was due: jog at 1.00 s costs 0.2, playing on 3.", "jog", 30, 0.2, 3.0, WALK),
     decision(7, Action.CONTINUE, "The next search is due in 0.1 s.", "jog", 33, searched=False),
@@ -355,3 +355,10 @@ def test_candidates_without_times_and_of_one_database_need_no_columns_for_these(
         rank  asset  frame    cost    pose  trajectory  bias
            1  jog       45  0.7500  0.5000      0.2500     0
     """)
+
+
+@pytest.mark.parametrize(
+    ("fact", "text"), [(-123.4567, "-123"), (65.123456, "65.1"), (180.0, "180"), (9.57e-12, "0"), (2.5, "2.5"), (3, "3")]
+)
+def test_a_fact_has_three_digits(fact: object, text: str):
+    assert fact_text(fact) == text

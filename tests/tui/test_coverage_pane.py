@@ -113,7 +113,7 @@ def test_a_small_table_is_measured_at_once_and_its_gaps_stand_largest_first():
 
 def test_the_detail_follows_the_cursor_and_shows_the_cell_to_change():
     _, screen = shown(keys=("down",))
-    assert "Gap 2 of 3: 30.00 % of the contexts, 5.00 % in no gap above" in screen
+    assert "Gap 2 of 3: 30.00 % of the contexts, 5.00 % without the gaps above" in screen
     assert "gait: Run, speed: (4..10]" in screen
     assert "Nearest: row 1 Anim_0, with 2 cells to change: first gait from Walk to Any." in screen
 

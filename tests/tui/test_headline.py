@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from terminal import EditorApp, press, screen_text, with_editor
 
-from tui.model.number_forms import three_digits
+from contextdb.cells.words import three_digits
 from tui.widgets.bar import CellLine
 
 TOML = '[tables.t]\npolicy = "{policy}"\npriority = "Priority"\nfallback = "idle"\n'

@@ -16,12 +16,12 @@ from textual.screen import Screen
 from textual.widget import Widget
 from textual.widgets import Input, Static
 
+from contextdb.cells.words import three_digits
 from contextdb.console import printable
 from contextdb.motion.output.bank import PoseBank
 from contextdb.motion.selection.decision import Action
 from contextdb.motion.trace.status import Status
 
-from ..model.number_forms import three_digits
 from . import reasons
 from .bars import Bars
 from .channels import Channels, Dial

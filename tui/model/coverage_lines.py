@@ -117,7 +117,7 @@ def gap_text(gap: Gap, number: int, report: CoverageReport, table: Table) -> str
     """Everything about a gap."""
     about = "" if gap.is_exact else "about "
     size = f"{about}{format_percent(gap.share)} of the contexts" if gap.share else "single points, of no volume"
-    new = f", {format_percent(gap.new_share)} in no gap above" if gap.new_share != gap.share else ""
+    new = f", {format_percent(gap.new_share)} without the gaps above" if gap.new_share != gap.share else ""
     of = f"{len(report.gaps)}{'' if report.gaps_complete else '+'}"
     lines = [f"Gap {number + 1} of {of}: {size}{new}", cells_text(gap.cells)]
     if gap.nearest is not None:

@@ -115,19 +115,3 @@ def _centre_of(piece: Piece, domain: Domain) -> str | None:
     if domain.type.is_whole and not float(centre).is_integer():
         return None
     return f"{domain.type.spelling.write(float(centre))}, {format_number(float(tolerance))}"
-
-
-_LONG = re.compile(r"-?\d+\.\d{4,}|-?\d(?:\.\d+)?e-\d+")
-ZERO = 1e-9
-
-
-def three_digits(text: str) -> str:
-    """A number of many decimals, as a game sends them, with three digits that count; any other text as it is."""
-    if not _LONG.fullmatch(text):
-        return text
-    number = float(text)
-    if abs(number) < ZERO:
-        return "0"
-    places = max(2 - math.floor(math.log10(abs(number))), 0)
-    short = f"{number:.{places}f}"
-    return short.rstrip("0").rstrip(".") if "." in short else short

@@ -14,11 +14,11 @@ from rich.segment import Segment
 from rich.style import Style
 from textual.strip import Strip
 
+from contextdb.cells.words import three_digits
 from contextdb.errors import plural
 
 from ..model.displayed_table import DisplayedTable, Header
 from ..model.layout import Layout, cut, cut_middle, name_lines
-from ..model.number_forms import three_digits
 from ..model.selection import Block
 from ..model.window import MARKS, PICKED, PLAYS, Window
 

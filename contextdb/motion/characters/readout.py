@@ -11,6 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 from contextdb.cells.arguments import require_kind
 from contextdb.motion.characters.updates import Updated
 from contextdb.motion.selection.decision import Action, Decision, Playing
+from contextdb.motion.selection.guards import Held
 
 
 @runtime_checkable
@@ -65,7 +66,7 @@ class Readout:
         self._updated, self._table, self._displayed = updated, table, seen.playing if isinstance(seen, Decision) else seen
         if not self._chosen or decision.action in (Action.START, Action.JUMP):
             self._chosen = decision.why
-        self.why = f"No longer valid, but held by {decision.held}." if decision.held else self._chosen
+        self.why = Held(decision.held).waits or self._chosen
         if isinstance(shown, Decision):
             self.why = shown.why
         self.valid = table.query(updated.facts, unknown="any")

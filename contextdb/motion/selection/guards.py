@@ -31,3 +31,17 @@ class Held(StrEnum):
     def sentence(self) -> str:
         """What lets it play on without a search, in words."""
         return "while its NextNaturalOnly span lasts" if self is Held.NEXT_NATURAL else "to its natural end"
+
+    @property
+    def waits(self) -> str:
+        """What the jump away from it waits for, in words for a player."""
+        return _WAITS[self]
+
+
+_WAITS = {
+    Held.NOTHING: "",
+    Held.NEXT_NATURAL: "No longer valid: it waits for a natural transition.",
+    Held.UNTIL_NATURAL: "No longer valid: it plays to its natural end.",
+    Held.COST_BAR: "No longer valid: it waits for a jump that fits better.",
+    Held.HYSTERESIS: "Valid within the hysteresis of a condition.",
+}

@@ -72,14 +72,15 @@ def waiting(before: Playing, playing: Playing, cost: float, bar: float, left_s: 
 
 def continued(trigger: Trigger, before: Playing, cost: float, best: float) -> str:
     """The reason when playing on is chosen."""
-    text = f"{trigger.sentence(before)}: to play on costs {cost:.4g}"
-    return f"{text}, the least." if cost <= best else f"{text}, about as little as the best, {best:.4g}."
+    if cost <= best:
+        return f"{trigger.sentence(before)}: playing on is cheapest, at cost {cost:.4g}."
+    return f"{trigger.sentence(before)}: playing on, at cost {cost:.4g}, is about as cheap as the best, {best:.4g}."
 
 
 def settling(trigger: Trigger, before: Playing, cost: float, best: float, stayed_s: float) -> str:
     """The reason when something else costs less, and what plays was entered only now."""
-    text = f"{trigger.sentence(before)}: to play on costs {cost:.4g}"
-    return f"{text}; the best, {best:.4g}, is too little less to leave it {stayed_s:.2f} s after it was entered."
+    text = f"{trigger.sentence(before)}: playing on costs {cost:.4g}"
+    return f"{text}; the best, {best:.4g}, is not cheap enough to leave it {stayed_s:.2f} s after it was entered."
 
 
 def nothing_else(trigger: Trigger, before: Playing | None, is_held: bool) -> str:

@@ -7,7 +7,11 @@ A context becomes JSON: tags a sorted list, a NaN fact null, and what JSON has n
 is JSON too.
 
 Candidates are worked out again from the query, the filters and the databases. The column `candidates` holds those of code of your
-own, which cannot; of their frames `Candidates.why` comes back empty, its sums are in `counts`.
+own, which cannot; of their frames `Candidates.why` comes back empty, its sums are in `counts`. `body_x`, `body_z` and
+`body_heading` are where the game had the body, or null.
+
+The file's metadata: `contextdb.trace`, the number of the format; `about`, JSON with the rate, features, channels and ranges of each
+database and digests of what its costs come from; `candidates`, how many a decision shows; `digest`, of the columns.
 """
 
 from __future__ import annotations

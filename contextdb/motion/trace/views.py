@@ -11,6 +11,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 
+from contextdb.cells.words import three_digits
 from contextdb.console import printable
 from contextdb.errors import in_quotes
 from contextdb.motion.markup.left_out import LeftOut
@@ -222,10 +223,10 @@ def _parts_text(decision: Decision, playing: Playing | None) -> str:
 
 
 def fact_text(value: object) -> str:
-    """A fact as people write it."""
+    """A fact as people write it, a number with three digits."""
     if isinstance(value, (list, tuple, set, frozenset)):
         return " ".join(f"+{tag}" for tag in sorted(map(str, value))) or "no tags"
-    return "missing" if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+    return "missing" if value is None else three_digits(f"{value:.9g}") if isinstance(value, float) else str(value)
 
 
 def search_lines(decision: Decision, width: int = WIDTH) -> Iterator[str]:

@@ -131,8 +131,9 @@ CDB_API cdb_status cdb_cast(const cdb_table *table, const cdb_column *columns, c
     cdb_status status = CDB_OK;
     memset(rows, 0, room * sizeof *rows);
     if (room < n_words) return cdbi_fault(fault, CDB_TOO_SHORT, "the array for the rows is shorter than a mask of the table", -1, "");
+    if (table->n_roles > sizeof is_in) return cdbi_fault(fault, CDB_OTHER_TABLE, "the table has more roles than can be cast here", -1, "");
     for (i = 0; i < n_actors; i++)
-        if (actors[i].role < 0 || (size_t)actors[i].role >= table->n_roles || n_actors > CDB_MOST_ACTORS || table->n_roles > sizeof is_in)
+        if (actors[i].role < 0 || (size_t)actors[i].role >= table->n_roles || n_actors > CDB_MOST_ACTORS)
             return cdbi_fault(fault, CDB_WRONG_FACT, "an actor is offered for no role of the table, or they are too many", -1, "");
     status = cdbi_find_cast(table, schema, facts, actors, n_actors, cast, &n_cast, fault);
     if (status != CDB_OK) return status;

@@ -200,7 +200,7 @@ CDB_API double cdbm_enter_one(cdbm_crowd *crowd, size_t i, const char *database,
 
 /* Ask a table with the facts of some characters: each is offered for each of some roles; facts of no role are those of the first. 0 with
  * too little room. */
-static inline int cdbm_ask_of_all(const cdbm_crowd *crowd, size_t table, size_t set, const size_t *who, size_t n, cdbm_asked *to, cdbm_room *room)
+static inline int cdbm_ask_of_all(const cdbm_crowd *crowd, size_t table, size_t set, const size_t *who, size_t n, cdbm_table_input *to, cdbm_room *room)
 {
     const cdb_any *any = crowd->player.opened[table];
     const cdb_schema *schema = &any->schema;
@@ -233,7 +233,7 @@ CDB_API double cdbm_meet_ones(cdbm_crowd *crowd, const char *name, const size_t 
     size_t databases[CDBM_MOST_DATABASES], n_databases, n_features = player->controller.n_features, i, k;
     double thresholds[CDBM_MOST_DATABASES];
     int set = cdbm_set_number(player, name);
-    cdbm_asked tables[CDBM_MOST_TABLES];
+    cdbm_table_input tables[CDBM_MOST_TABLES];
     cdbm_room room = crowd->room;
     cdbm_together together;
     cdbm_joint_hit hit;

@@ -20,18 +20,18 @@ typedef struct cdbm_actor {         /* somebody who may take part */
     double place[3];                /* x, z and heading */
 } cdbm_actor;
 
-typedef struct cdbm_asked {         /* what a table of the bundle is asked with */
+typedef struct cdbm_table_input {         /* what a table of the bundle is asked with */
     const cdb_fact *facts;          /* in the order of its schema, those of roles that are cast missing; NULL: as `rows` say */
     const cdb_actor *offers;        /* who is offered for its roles: the id is the number of the actor; or NULL: the clips alone are asked for */
     size_t n_offers;                /* at most CDB_MOST_ACTORS */
     const uint64_t *rows;           /* its valid rows, whoever plays; NULL: all */
-} cdbm_asked;
+} cdbm_table_input;
 
 typedef struct cdbm_together {      /* what is asked for */
     size_t set;                     /* cdbm_set_number */
     const cdbm_actor *actors;
     size_t n_actors;
-    const cdbm_asked *tables;       /* [tables of the bundle], or NULL: all clips may play */
+    const cdbm_table_input *tables;       /* [tables of the bundle], or NULL: all clips may play */
     const int64_t *casts;           /* [n_casts, K] these alone, as numbers of actors; NULL: all that the tables let, or all there are */
     size_t n_casts;
     const double *gives;            /* [K] how readily each role gives way when the clip is put down, 0 not at all; NULL: all alike */
@@ -154,7 +154,7 @@ static inline void cdbm_soft_costs(const cdb_any *any, const cdb_fact *facts, cd
 static inline int cdbm_ask_for_casts(const cdbm_player *player, size_t table, const cdbm_together *together, const char *const *roles,
     size_t n_roles, int is_mirrored, cdbm_cast_rows *to, cdbm_room *room)
 {
-    const cdbm_asked *asked = &together->tables[table];
+    const cdbm_table_input *asked = &together->tables[table];
     const cdb_any *any = player->opened[table];
     const cdb_schema *schema = &any->schema;
     size_t n_words = any->table.n_words, n_rows = any->table.n_rows, n = asked->facts && asked->offers ? asked->n_offers : 0, i, k;

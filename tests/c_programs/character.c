@@ -153,14 +153,14 @@ static void meet(const cdbm_player *player, const memory *own, FILE *out)
     const double *at_number = (const double *)take(8, (size_t)*(const int64_t *)take(8, 1));
     const cdb_any *any = player->opened[player->n_tables - 1];
     cdbm_actor actors[4];
-    cdbm_asked tables[CDBM_MOST_TABLES], *asked = &tables[player->n_tables - 1];
+    cdbm_table_input tables[CDBM_MOST_TABLES], *asked = &tables[player->n_tables - 1];
     cdb_actor offers[12];
     cdb_fact facts[13][4];
     cdbm_together together;
     cdbm_joint_hit hit;
     cdbm_room room;
     options given;
-    double *queries = (double *)malloc(4 * sizeof(double) * player->controller.n_features), gives[2], told[6];
+    double *queries = (double *)malloc(4 * sizeof(double) * player->controller.n_features), gives[2], chosen[6];
     int64_t casts[24];
     uint64_t rows;
     size_t who[4], i, k, way;
@@ -203,9 +203,9 @@ static void meet(const cdbm_player *player, const memory *own, FILE *out)
     together.in_match_range = *at_number++ != 0.0, together.tags = give_tags(at_number, &given);
     room.left = cdbm_together_room(player, together.set, together.n_actors, asked->n_offers), room.at = (char *)malloc(room.left);
     if (!room.at || !queries || cdbm_choose_together(player, &together, &hit, room) != 1) exit(11);
-    told[0] = (double)hit.range, told[1] = (double)hit.frame, told[2] = way == 3 ? -1.0 : (double)hit.row, told[3] = hit.cost;
-    for (k = 0; k < 2; k++) told[4 + k] = hit.range < 0 ? -1.0 : (double)hit.cast[k];
-    write_all(out, told, sizeof(double), 6);
+    chosen[0] = (double)hit.range, chosen[1] = (double)hit.frame, chosen[2] = way == 3 ? -1.0 : (double)hit.row, chosen[3] = hit.cost;
+    for (k = 0; k < 2; k++) chosen[4 + k] = hit.range < 0 ? -1.0 : (double)hit.cast[k];
+    write_all(out, chosen, sizeof(double), 6);
     for (k = 0; is_played && hit.range >= 0 && k < hit.n_roles; k++) own->one_offs[who[hit.cast[k]]] = hit.one_offs[k], own->are_playing[who[hit.cast[k]]] = 1;
     free(queries);
     free(room.at);
@@ -272,7 +272,7 @@ static uint64_t drawn(uint64_t *seed)
 static int try_meeting(const cdbm_player *player, const double *state, int tick, cdbm_one_off *to)
 {
     static const double ways[3][6] = {{0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, {3.0, 0.0, 0.0, 0.0, 0.0, 0.0}, {4.0, 5.0, 0.0, 1.0, 2.0, 0.0}};
-    cdbm_asked tables[CDBM_MOST_TABLES], *asked = player->n_tables > 0 ? &tables[player->n_tables - 1] : NULL;
+    cdbm_table_input tables[CDBM_MOST_TABLES], *asked = player->n_tables > 0 ? &tables[player->n_tables - 1] : NULL;
     const cdb_any *any = asked ? player->opened[player->n_tables - 1] : NULL;
     cdb_fact *facts = (cdb_fact *)calloc(CDB_MOST_FACTS, sizeof *facts);
     cdb_actor offers[4];

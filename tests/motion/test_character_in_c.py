@@ -188,9 +188,9 @@ def programs(tmp_path_factory):
     """The program, as each compiler makes it with little optimisation, with much, and under sanitizers."""
     folder, first = tmp_path_factory.mktemp("character"), all_compilers()[0]
     (folder / "contextdb_motion.h").write_text(header(), encoding="ascii")
-    commands = variants(
-        ("-O0",), ("-O3", "-DCDBM_CASTS_AT_ONCE=2") if IS_FULL else ("-O0", "-DCDBM_NARROW", "-DCDBM_CASTS_AT_ONCE=2")
-    ) + [(*first, *own) for own in [sanitizers(*first)] if own]
+    commands = variants(("-O0",), ("-O3",) if IS_FULL else ("-O0", "-DCDBM_NARROW")) + [
+        (*first, *own, "-DCDBM_CASTS_AT_ONCE=2") for own in [sanitizers(*first)] if own
+    ]
     options = ["-std=c99", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wno-unused-function"]
     made = [
         compiled([*command, *options], PROGRAMS / "character.c", folder / f"character{number}", folder, "-lm")
@@ -360,9 +360,9 @@ def session(rng, n_ticks, is_captured=False):
             is_going_on = events[i] is not None and left_s > 0.0
             events[i] = (name, max(left_s - dt, 0.0)) if is_going_on or rng.random() < 0.04 else None
         gaits = ["Idle" if not math.hypot(*stick) else "Walk" if math.hypot(*stick) < 2.0 else "Run" for stick in sticks]
-        meetings, told, free = [], b"", [i for i in range(n) if once[i] is None]
+        meetings, chosen, free = [], b"", [i for i in range(n) if once[i] is None]
         if searchers and len(free) > 1 and rng.random() < 0.3:
-            joined, numbers, told = met(rng, members, free, searchers)
+            joined, numbers, chosen = met(rng, members, free, searchers)
             meetings.append(numbers)
             once = [joined.get(i, one) for i, one in enumerate(once)]
         entering = [i for i in range(n) if once[i] is None and rng.random() < 0.08]
@@ -384,7 +384,7 @@ def session(rng, n_ticks, is_captured=False):
             event_number, in_s = (-1, 0.0) if event is None else (EVENTS.index(event[0]), event[1])
             given.append(struct.pack("3dqqd", *stick, facing, number, event_number, in_s))
         given += meetings + [struct.pack("18d", i, *numbers) for i, _, numbers in entries]
-        states = told + b"".join(one.state for one in crowd)
+        states = chosen + b"".join(one.state for one in crowd)
         poses = [updated.pose for updated in updates]
         numbers = [(np.array(pose.root), pose.rotations, pose.translations, pose.positions) for pose in poses]
         packets = b"".join(bytes([len(packet)]) + packet for packet in (one.pack() for one in crowd))

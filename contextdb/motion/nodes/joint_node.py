@@ -14,13 +14,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Unpack
 
 import numpy as np
 
 from contextdb.cells.arguments import require_kind, require_real, require_text, require_whole
-from contextdb.core import Controllers, begin_roles
+from contextdb.core import begin_roles
 from contextdb.errors import Fault, MotionError, QueryError, in_quotes, some
 from contextdb.motion.clips.ground_place import GroundPlace
 from contextdb.motion.joint.database import JointDatabase
@@ -145,6 +144,8 @@ class JointNode:
                 problem = f"the database {in_quotes(name)} has no schema that gives its rate."
                 raise MotionError(Fault(problem, "a database that was built from clips"))
         self.searcher = searcher
+        databases = ((name, joint.database) for name, joint in searcher.databases.items())
+        self._choosers = {name: Chooser(Selector([Entry(name, each)]), ControllerSettings()) for name, each in databases}
 
     def enter(self, queries: Queries, places: Places, **options: Unpack[JointOptions]) -> JointPlay | None:
         """Choose clip, frame and cast, and play them from this update on; None when nothing may play.
@@ -163,17 +164,12 @@ class JointNode:
         here = places_of(places, [hit.cast[role] for role in joint.roles])
         put, targets = np.array([hit.places[role] for role in joint.roles]), np.empty((len(joint.roles), 3))
         ranges, warps = np.ascontiguousarray(joint.ranges[hit.range]), joint.database.marks.warps
-        last, *window = begin_roles(self._cores[str(hit.database)], ranges, hit.frame, warps, put, here, targets)
+        last, *window = begin_roles(self._choosers[str(hit.database)].core, ranges, hit.frame, warps, put, here, targets)
         n_frames = last + 1 - hit.frames[joint.roles[0]]
         each = zip(joint.roles, (Target(*numbers) for numbers in targets.tolist()), strict=True)
         plays = {role: _play(joint, hit, k, n_frames, target, Window(*window)) for k, (role, target) in enumerate(each)}
         starts = {role: RootMotion(*place) for role, place in zip(joint.roles, here.tolist(), strict=True)}
         return JointPlay(hit, plays, starts, window[1])
-
-    @cached_property
-    def _cores(self) -> dict[str, Controllers]:
-        databases = ((name, joint.database) for name, joint in self.searcher.databases.items())
-        return {name: Chooser(Selector([Entry(name, each)]), ControllerSettings()).core for name, each in databases}
 
 
 def _play(joint: JointDatabase, hit: JointHit, k: int, n_frames: int, target: Target, window: Window) -> MatchPlay:

@@ -13,7 +13,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import tables
 from terminal import drive, press, screen_text, with_editor
-from terminal import said as said_by
 from textual.app import App
 from textual.pilot import Pilot
 from textual.screen import Screen
@@ -541,19 +540,6 @@ def test_an_import_goes_into_a_folder_and_leaves_a_path_that_is_none(table: Tabl
     assert folder == "../"
     assert none == "m\0re.csv"
     assert chosen in ("book.xlsx", "broken.xlsx", "more.csv")
-
-
-def test_the_editor_writes_an_export_and_says_so(table: Table):
-    async def script(app: Any, pilot: Pilot[Any]) -> str:
-        app.main.action_export()
-        await pilot.pause()
-        app.screen.query_one("#export-path", Input).value = "work/out.tsv"
-        await pilot.press("enter")
-        await settled(pilot)
-        return said_by(app)
-
-    assert with_editor(table.path, script) == "Wrote out.tsv."
-    assert (table.path.parent / "work" / "out.tsv").read_text("utf-8").splitlines()[0] == "Asset Name\tspeed"
 
 
 @pytest.mark.parametrize("where", ["read", "answer"])

@@ -108,7 +108,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Every day every second example of an editor's test that has four and more, unless one is asked for by its name."""
+    """Every day every second example of an editor's test that has four and more, unless one is asked for by its name; all pages."""
     if SIZE != "few" or any("[" in word for word in config.args):
         return
     names = [item.nodeid.partition("[")[0] for item in items]
@@ -116,7 +116,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     chosen, left_out = [], []
     for item, name in zip(items, names, strict=True):
         numbers[name] += 1
-        is_chosen = numbers[name] % 2 or sizes[name] < 4 or not name.startswith("tests/tui/")
+        is_some_of_many = name.startswith("tests/tui/") and "/test_pages.py" not in name and sizes[name] >= 4
+        is_chosen = numbers[name] % 2 or not is_some_of_many
         (chosen if is_chosen else left_out).append(item)
     config.hook.pytest_deselected(items=left_out)
     items[:] = chosen

@@ -14,9 +14,9 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent), str(HERE.parent.parent)]
 
 from motion_project import write_project  # noqa: E402
-from replay import SCROLL_BAR, Replay, ReplayError, Step, _text  # noqa: E402
+from replay import Replay, ReplayError, Step, _text  # noqa: E402
 from running import run  # noqa: E402
-from terminal import drive, screen_text  # noqa: E402
+from terminal import drive  # noqa: E402
 
 from contextdb.commands.motion_replay_command import databases_of  # noqa: E402
 from contextdb.motion import Trace  # noqa: E402
@@ -50,14 +50,8 @@ class DebugReplay(Replay):
         assert run("motion", "run", str(self.folder / "game"), *session).code == 0
         self.at_first = {"contextdb.toml": _text(self._path("contextdb.toml"))}
 
-    def _show(self, step: Step) -> Any:
-        if step.command != "screen":
-            return super()._show(step)
-        assert self.app is not None
-        text = screen_text(self.app).replace(str(self.folder), "FOLDER")
-        lines = [SCROLL_BAR.sub("", line) for line in text.splitlines()]
-        first, last = map(int, step.rest.split() or (0, len(lines) - 1))
-        return iter(lines[first : last + 1])
+    def _lines(self) -> list[str]:
+        return [line.replace(str(self.folder), "FOLDER") for line in super()._lines()]
 
     def _path(self, name: str) -> Path:
         return self.folder / "game" / name

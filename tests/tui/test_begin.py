@@ -64,28 +64,6 @@ def test_an_empty_table_gets_a_name_and_takes_what_is_typed(tmp_path):
     assert (tmp_path / "moves.csv").read_text() == "Asset Name\nwalk\nrun\n"
 
 
-def test_a_name_that_does_not_exist_begins_a_table_of_that_name(tmp_path):
-    async def script(app, pilot):
-        first = lines(app)[0]
-        await press(pilot, "enter")
-        return first, app.main.table_name
-
-    assert with_editor(tmp_path / "new.csv", script) == ("An empty table new", "new")
-    assert (tmp_path / "new.csv").read_text() == "Asset Name\n"
-
-
-def test_a_name_nearly_right_offers_the_table_that_there_is(tmp_path):
-    (tmp_path / "moves.csv").write_text("Asset,hit\nwalk,True\n")
-
-    async def script(app, pilot):
-        offered = lines(app)
-        await press(pilot, "down", "enter")
-        return offered[1], app.main.table_name
-
-    assert with_editor(tmp_path / "movse.csv", script) == ("Open moves, which there is", "moves")
-    assert not (tmp_path / "movse.csv").exists()
-
-
 def test_a_workbook_with_a_title_over_its_columns_becomes_a_table_of_its_name(tmp_path):
     path = book(tmp_path / "catches.xlsx")
 
@@ -154,20 +132,6 @@ def test_an_empty_clipboard_is_said_and_asked_again(tmp_path):
         return screen_text(app)
 
     assert "The clipboard is empty." in with_editor(tmp_path, script)
-
-
-def test_a_table_that_is_pasted_into_an_empty_one_is_asked_about(tmp_path):
-    path = tmp_path / "t.csv"
-    path.write_text("Asset Name\n")
-
-    async def script(app, pilot):
-        app.main.assets.grid.paste("Name\tgait\nwalk\tWalk\nrun\tRun\n")
-        await press(pilot)
-        is_asked = isinstance(app.screen, ImportDialog)
-        await imported(app, pilot)
-        return is_asked, list(app.main.session.sheet.table.assets)
-
-    assert with_editor(path, script, (100, 40)) == (True, ["walk", "run"])
 
 
 @pytest.mark.parametrize("name", ["no/such/table.csv", "new.xlsx"])

@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from editor_desk import CELL, CHART, HIT, SIDE, SPEED, STATE, WAY, Desk, committed, line_at, press, taken
+from editor_desk import CELL, CHART, HIT, SIDE, SPEED, STATE, WAY, Desk, committed, line_at, press
 from terminal import drive, screen_text
 from textual import events
 from textual.geometry import Region
@@ -11,8 +11,6 @@ from textual.pilot import Pilot
 from textual.screen import ModalScreen
 from textual.widgets import Button
 
-from contextdb.cells.conditions import Condition
-from contextdb.cells.domains import Domain
 from contextdb.errors import Fault
 from tui.widgets.cell_editor import CellEditor
 from tui.widgets.editing.entry import one_line
@@ -99,42 +97,6 @@ def test_it_can_be_placed_again_when_the_screen_changes():
 
 
 # ---- leaving
-
-
-@pytest.mark.parametrize(
-    ("key", "down", "right", "is_fill"),
-    [
-        ("enter", 1, 0, False),
-        ("shift+enter", -1, 0, False),
-        ("tab", 0, 1, False),
-        ("shift+tab", 0, -1, False),
-        ("ctrl+enter", 0, 0, True),
-        ("ctrl+j", 0, 0, True),
-    ],
-)
-def test_the_keys_that_take_the_text_say_where_the_cursor_goes(key, down, right, is_fill):
-    desk = Desk(SPEED, "1..2")
-    press(desk, key)
-    assert committed(desk) == ("1..2", down, right, is_fill)
-
-
-@pytest.mark.parametrize(("key", "down", "right"), [("up", -1, 0), ("down", 1, 0), ("left", 0, -1), ("right", 0, 1)])
-def test_arrows_take_the_text_when_the_editor_was_opened_by_typing(key, down, right):
-    desk = Desk(CHART, "C", is_typing=True)
-    press(desk, "B", key)
-    assert committed(desk) == ("CB", down, right, False)
-
-
-def test_after_f2_arrows_move_in_the_text():
-    desk = Desk(SPEED, "1", is_typing=True)
-    press(desk, "f2", "left", "0", "enter")
-    assert committed(desk)[0] == "01"
-
-
-def test_escape_leaves_the_cell_as_it_was():
-    desk = Desk(SPEED, "1..2")
-    press(desk, "9", "escape")
-    assert [type(m) for m in desk.said] == [CellEditor.Cancelled]
 
 
 def test_nothing_is_posted_twice():
@@ -224,20 +186,6 @@ def test_a_click_on_the_popup_changes_nothing():
 # ---- bad entries and mends
 
 
-def test_a_bad_entry_stays_with_what_is_wrong_what_is_accepted_and_the_mend():
-    desk = Desk(WAY, "20; 9.99")
-    screen = press(desk, "enter")
-    assert desk.said == []
-    assert '! cannot read "20; 9.99" as an angle.' in screen
-    assert 'Accepted: "20, 9.99" (centre, tolerance)' in screen
-    assert 'Did you mean "20, 9.99"? Ctrl+T accepts it.' in screen
-
-
-def test_one_key_takes_the_mend():
-    assert taken(WAY, "20; 9.99", "enter", "ctrl+t", "enter") == "20, 9.99"
-    assert taken(WAY, "20; 9.99", "ctrl+t", "enter") == "20, 9.99"
-
-
 def test_a_click_takes_the_mend():
     desk = Desk(WAY, "20; 9.99")
 
@@ -249,24 +197,6 @@ def test_a_click_takes_the_mend():
 
     drive(desk, script)
     assert committed(desk)[0] == "20, 9.99"
-
-
-def test_a_mend_of_a_value_with_a_quote_is_taken_as_it_would_be_typed():
-    odd = Condition("odd", Domain("enum", ('say "no"', "Half Back")))
-    assert taken(odd, "Half Bakc", "enter", "ctrl+t", "enter") == '"Half Back"'
-
-
-def test_typing_on_takes_the_fault_away():
-    desk = Desk(SPEED, "1..2x")
-    screen = press(desk, "enter", "backspace")
-    assert "cannot read" not in screen
-    assert "1 to 2 m/s, ends included" in screen
-
-
-def test_while_one_types_what_is_wrong_is_said_in_short():
-    screen = press(Desk(SPEED, "1", is_typing=True), "full_stop", "full_stop", "x")
-    assert '! cannot read "1..x" as a number.' in screen
-    assert "Accepted" not in screen
 
 
 def test_a_cell_that_nothing_matches_is_refused_as_the_check_says():
@@ -310,30 +240,6 @@ def test_what_was_taken_can_still_be_refused():
 )
 def test_a_paste_is_one_line(pasted, line):
     assert one_line(pasted) == line
-
-
-def test_a_paste_goes_in_at_the_caret_and_nothing_is_posted():
-    desk = Desk(CHART, "CB ")
-
-    async def script(pilot: Pilot[Any]) -> None:
-        desk.editor.entry.post_message(events.Paste("FS\rSS\r"))
-        await pilot.pause()
-        assert desk.said == []
-        await pilot.press("enter")
-
-    drive(desk, script)
-    assert committed(desk)[0] == "CB FS SS"
-
-
-def test_a_paste_into_the_open_list_adds_words():
-    desk = Desk(CHART, "CB", open_list=True)
-
-    async def script(pilot: Pilot[Any]) -> None:
-        desk.copy_to_clipboard("FS\tSS")
-        await pilot.press("ctrl+v", "enter")
-
-    drive(desk, script)
-    assert committed(desk)[0] == "CB FS SS"
 
 
 def test_the_words_of_a_message_are_broken_at_spaces_and_long_ones_anywhere():

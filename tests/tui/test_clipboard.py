@@ -1,12 +1,8 @@
 """Tab-separated text as spreadsheets write it, and the shapes in which it is pasted."""
 
-from pathlib import Path
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from terminal import press, screen_text, settled, with_editor
-from textual.events import Paste
 
 from tui.model.clipboard import format_tsv, parse_tsv, paste_doubt, place_paste
 from tui.model.selection import Block
@@ -93,28 +89,3 @@ def test_every_cell_of_a_paste_is_the_one_of_its_tile(height, width, tall, wide)
 def test_text_with_commas_is_split_where_all_its_lines_have_as_many_cells(text, rows):
     doubt = paste_doubt(text, [None, None, None])
     assert (doubt and parse_tsv(doubt.ways[0][1])) == rows
-
-
-def test_csv_text_pasted_into_the_grid_is_offered_to_be_split_and_kept_whole_where_that_is_chosen(tmp_path: Path):
-    (tmp_path / "t.csv").write_text("Asset,a,b\nwalk,1,x\nrun,2,y\n")
-
-    async def script(app, pilot):
-        async def paste() -> str:
-            app.main.assets.grid.post_message(Paste('hop,"1..2",x\nhip,3,y\n'))
-            await settled(pilot)
-            await settled(pilot)
-            return screen_text(app)
-
-        asked = await paste()
-        await press(pilot, "enter")
-        table = app.main.session.sheet.table
-        split = [table.text(row, name) for row in range(2) for name in ("Asset", "a", "b")]
-        await press(pilot, "ctrl+z")
-        await paste()
-        await press(pilot, "down", "enter")
-        return asked, split, app.main.session.sheet.table.text(1, "Asset")
-
-    asked, split, whole = with_editor(tmp_path / "t.csv", script)
-    assert "Split at the commas, into 3 columns" in asked
-    assert split == ["hop", "1..2", "x", "hip", "3", "y"]
-    assert whole == "hip,3,y"

@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 from edit_strategies import write_schema
-from terminal import press, said, screen_text, with_editor
+from terminal import press, with_editor
 
-import contextdb as cdb
 from contextdb.tables.project import load_table
 from contextdb.tables.table import Table
 from tui.model.column_sheet import ColumnSheet, Wrong
@@ -195,46 +194,6 @@ def test_a_declared_condition_that_others_use_stays(folder):
     sheet.delete_rows()
     with pytest.raises(Wrong, match="wet is used by 1 derived fact"):
         sheet.edit()
-
-
-def test_the_editor_applies_the_sheet_as_one_step_and_saves_it(folder):
-    async def script(app, pilot):
-        await press(pilot, "alt+j", "e")
-        asked = screen_text(app)
-        await press(pilot, "down", "right", "right", "right", "right", "right", *"9", "enter", *"x", "enter")
-        refused = screen_text(app)
-        await press(pilot, "escape", "escape")
-        told, domain = said(app), app.main.session.sheet.table.condition("speed").condition.domain
-        await press(pilot, "ctrl+s", "ctrl+z")
-        return asked, refused, told, domain.maximum, app.main.session.sheet.table.condition("speed").condition.domain.maximum
-
-    asked, refused, told, most, undone = with_editor(folder / "t.csv", script, (160, 40))
-    assert "Sheet of columns" in asked
-    assert "has none" in refused
-    assert (told, most, undone) == ("Change the column speed.", 9.0, float("inf"))
-    assert cdb.load(folder / "t.csv").condition("speed").condition.domain.maximum == 9.0
-
-
-def test_a_wrong_sheet_stays_open_at_the_cell_and_is_discarded_by_a_key(folder):
-    async def script(app, pilot):
-        await press(pilot, "alt+j", "e", "down", "delete", "escape")
-        wrong = screen_text(app)
-        await press(pilot, "alt+x")
-        return wrong, app.main.session.sheet.is_modified, len(app.screen_stack)
-
-    wrong, is_modified, depth = with_editor(folder / "t.csv", script, (120, 36))
-    assert "! A column needs a name" in wrong
-    assert not is_modified
-    assert depth == 2
-
-
-def test_enter_after_a_run_of_tabs_goes_to_the_name_of_the_next_column(folder):
-    async def script(app, pilot):
-        await press(pilot, "alt+j", "e", *["down"] * 6, *"hp", "tab", "tab", *"int", "enter", *"mp", "enter")
-        table = app.screen.sheet.table
-        return [column.to_list()[-3:-1] for column in table.columns[:3]]
-
-    assert with_editor(folder / "t.csv", script, (120, 36)) == [["hp", "mp"], ["", ""], ["int", ""]]
 
 
 def test_two_lines_stand_over_the_rows_for_no_fact_leaves_any_here(folder):

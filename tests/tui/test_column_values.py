@@ -1,9 +1,6 @@
 """A column as a whole: its values with their counts, mends and replacements, tests of the filter, several keys to sort by."""
 
-from pathlib import Path
-
 import pytest
-from terminal import press, said, screen_text, with_editor
 
 from contextdb.columns import TextColumn
 from contextdb.errors import TableError
@@ -157,82 +154,3 @@ def test_a_selection_of_numbers_is_summed_up_and_other_texts_are_counted():
     sheet.go(0, 2)
     sheet.go(4, 2, extend=True)
     assert selection_summary(sheet) == ": 4 different texts"
-
-
-@pytest.fixture
-def path(tmp_path: Path) -> Path:
-    file = tmp_path / "t.csv"
-    file.write_text("Asset,gait\na,Walk\nb,Run\nc,Walk\nd,Jump\n")
-    return file
-
-
-def test_enter_in_the_dialog_filters_and_chips_take_it_off_again(path):
-    async def script(app, pilot):
-        await press(pilot, "right", "alt+d")
-        dialog = screen_text(app)
-        await press(pilot, "enter")
-        lines = screen_text(app)
-        n_shown = len(app.main.session.sheet.view)
-        await press(pilot, "alt+y")
-        return dialog, lines, n_shown, len(app.main.session.sheet.view)
-
-    dialog, lines, n_shown, n_after = with_editor(path, script, (100, 30))
-    assert "Values of gait" in dialog
-    assert "gait: Walk ✕" in lines
-    assert (n_shown, n_after) == (2, 4)
-
-
-def test_a_chip_is_clicked_off(path):
-    async def script(app, pilot):
-        await press(pilot, "right", "alt+d", "enter")
-        await pilot.click("#chips", offset=(3, 0))
-        await press(pilot)
-        return len(app.main.session.sheet.view)
-
-    assert with_editor(path, script, (100, 30)) == 4
-
-
-def test_ticked_values_are_left_out(path):
-    async def script(app, pilot):
-        await press(pilot, "right", "alt+d", "home", "space", "space", "n")
-        return [app.main.session.sheet.text(row, 1) for row in range(len(app.main.session.sheet.view))]
-
-    assert len(with_editor(path, script, (100, 30))) == 1
-
-
-def test_a_value_is_renamed_from_the_dialog(path):
-    async def script(app, pilot):
-        await press(pilot, "right", "alt+d", "e", "ctrl+u", *"Stroll", "enter")
-        return app.main.session.sheet.table.text_column("gait").to_list(), said(app)
-
-    texts, told = with_editor(path, script, (100, 30))
-    assert texts == ["Stroll", "Run", "Stroll", "Jump"]
-    assert "Rename Walk to Stroll" in told
-
-
-def test_tests_are_typed_in_the_filter_and_add_up(path):
-    async def script(app, pilot):
-        await press(pilot, "right", "ctrl+l")
-        app.screen.query_one("#filter-column").value = True
-        await press(pilot, *("space" if c == " " else c for c in "not Walk"), "enter")
-        first = len(app.main.session.sheet.view)
-        await press(pilot, "ctrl+l", *("space" if c == " " else c for c in "not Run"), "enter")
-        return first, len(app.main.session.sheet.view), [said for said, _ in app.main.session.sheet.filter.parts]
-
-    assert with_editor(path, script, (100, 30)) == (2, 1, ["gait not Walk", "gait not Run"])
-
-
-def test_a_second_key_to_sort_by_is_added_turned_and_taken_away(path):
-    async def script(app, pilot):
-        seen = []
-        await press(pilot, "right", "alt+s", "left")
-        for _ in range(3):
-            await press(pilot, "alt+t")
-            seen.append([(key.column, key.is_descending) for key in app.main.session.sheet.sort.keys])
-        return seen
-
-    assert with_editor(path, script) == [
-        [("gait", False), ("Asset", False)],
-        [("gait", False), ("Asset", True)],
-        [("gait", False)],
-    ]

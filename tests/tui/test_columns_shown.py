@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from terminal import press, said, screen_text, with_editor
+from terminal import press, with_editor
 
 from tui.model.layout import layout
 from tui.model.session import Session
@@ -66,92 +66,6 @@ def path(tmp_path: Path) -> Path:
     file = tmp_path / "t.csv"
     file.write_text(RAW)
     return file
-
-
-def test_the_cursor_goes_over_hidden_columns_both_ways(path):
-    async def script(app, pilot):
-        await press(pilot, "right", "shift+right", "alt+0")
-        sheet, columns = app.main.session.sheet, []
-        for key in ("home", "right", "left", "end", "left", "left"):
-            await press(pilot, key)
-            columns.append(sheet.cursor[1])
-        return columns, app.main.assets.summary(), sheet.is_modified
-
-    columns, summary, is_modified = with_editor(path, script)
-    assert columns == [0, 3, 0, 5, 4, 3]
-    assert "2 columns hidden" in summary
-    assert not is_modified
-
-
-def test_a_group_is_folded_by_the_palettes_command_and_a_double_line_says_so(path):
-    async def script(app, pilot):
-        await press(pilot, "right")
-        await app.main.run_command("fold")
-        await press(pilot)
-        return said(app), screen_text(app)
-
-    told, screen = with_editor(path, script, (120, 24))
-    assert told == "The columns of Defender. are folded."
-    assert "║" in screen
-    assert "Facing" not in screen
-
-
-def test_finding_a_text_in_a_hidden_column_shows_it(path):
-    async def script(app, pilot):
-        await press(pilot, "right", "right", "right", "alt+0", "ctrl+f", *"Run", "enter", "escape")
-        sheet = app.main.session.sheet
-        return sheet.cursor, any(sheet.hidden)
-
-    assert with_editor(path, script) == ((1, 3), False)
-
-
-def test_going_to_a_column_by_its_name_shows_it(path):
-    async def script(app, pilot):
-        await press(pilot, "right", "right", "right", "alt+0", "home", "ctrl+g", *"gai", "enter")
-        sheet = app.main.session.sheet
-        return sheet.cursor, any(sheet.hidden)
-
-    assert with_editor(path, script) == ((0, 3), False)
-
-
-def test_the_list_of_columns_hides_freezes_and_goes(path):
-    async def script(app, pilot):
-        await press(pilot, "right", "alt+j", "space", "f", "down", "enter")
-        sheet = app.main.session.sheet
-        return sheet.visible_columns, sheet.cursor
-
-    shown, cursor = with_editor(path, script, (120, 30))
-    assert shown == VisibleColumns(frozenset(["Defender.Depth"]), frozen="Defender.Facing")
-    assert cursor == (0, 3)
-
-
-def test_the_capitals_that_a_hint_names_do_what_the_letters_do(path):
-    async def script(app, pilot):
-        await press(pilot, "right", "alt+j", "F", "escape", *"Q", "enter")
-        sheet = app.main.session.sheet
-        return sheet.visible_columns.frozen, sheet.table.text_column("Defender.Depth").to_list()
-
-    assert with_editor(path, script) == ("Defender.Depth", ["Q", "FS"])
-
-
-def test_the_list_of_columns_counts_the_texts_that_are_in_rows_now(path):
-    async def script(app, pilot):
-        await press(pilot, "right", "X", "enter", "alt+j")
-        return next(line.split()[-3:] for line in screen_text(app).splitlines() if " Defender.Depth " in line and "│" in line[:4])
-
-    assert with_editor(path, script, (80, 24))[1] == "2"
-
-
-def test_frozen_columns_stay_where_the_others_scroll(path):
-    async def script(app, pilot):
-        await press(pilot, "right")
-        await app.main.run_command("freeze")
-        await press(pilot, "end")
-        return screen_text(app), app.main.assets.grid.look.layout.n_frozen
-
-    screen, n_frozen = with_editor(path, script, (44, 24))
-    assert n_frozen == 2
-    assert "CB" in screen
 
 
 def test_problems_go_to_a_hidden_column_and_show_it(path):

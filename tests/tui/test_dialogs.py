@@ -98,16 +98,6 @@ def test_what_one_clicks_looks_the_same_in_a_form_and_in_other_dialogs(path):
     assert form == other
 
 
-def test_the_palette_has_the_title_and_the_keys_of_a_dialog(path):
-    async def script(app, pilot):
-        await press(pilot, "ctrl+p")
-        return screen_text(app)
-
-    text = with_editor(path, script)
-    assert "╭─ Commands ─" in text
-    assert "↑↓ choose · Enter OK · Esc cancel ─╯" in text
-
-
 def dialogs(of: type = Dialog) -> Iterator[type[Dialog[Any]]]:
     for each in of.__subclasses__():
         yield each

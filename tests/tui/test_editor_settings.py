@@ -122,43 +122,6 @@ def path(tmp_path: Path) -> Path:
     return file
 
 
-def test_the_keys_of_a_keymap_work_in_place_of_the_stock_ones(path):
-    async def script(app, pilot):
-        counts = []
-        for key in ("ctrl+b", "ctrl+w"):
-            await press(pilot, key)
-            counts.append(app.main.session.sheet.table.n_rows)
-        return counts
-
-    assert with_editor(path, script, settings=EditorSettings(keys={"duplicate": "ctrl+w"})) == [2, 3]
-
-
-def test_keys_with_a_blank_behind_the_comma_all_work(tmp_path, path):
-    settings = read(tmp_path, '[keys]\nduplicate = "ctrl+w, shift+f6"\n')
-
-    async def script(app, pilot):
-        await press(pilot, "ctrl+w", "shift+f6")
-        return app.main.session.sheet.table.n_rows
-
-    assert with_editor(path, script, settings=settings) == 4
-
-
-@pytest.mark.parametrize(("command", "key"), [("sort", "f10"), ("filter", "ctrl+w"), ("save", "f10"), ("find", "ctrl+w")])
-def test_a_keymap_holds_for_the_grid_the_pane_and_the_screen(path, command, key):
-    async def script(app, pilot):
-        await press(pilot, "x", "enter", key)
-        return screen_text(app), app.main.session.sheet
-
-    shown, sheet = with_editor(path, script, settings=EditorSettings(keys={command: key}))
-    done = {
-        "sort": sheet.sort is not None,
-        "filter": " Filter " in shown,
-        "save": not sheet.is_modified,
-        "find": "Replace with" in shown,
-    }
-    assert done[command]
-
-
 def test_the_help_shows_the_keys_of_a_keymap(path):
     async def script(app, pilot):
         await press(pilot, "f1")
@@ -180,12 +143,3 @@ def test_the_theme_of_the_settings_is_shown_and_another_wins_over_it(path):
     assert EditorApp(space, EditorSettings(theme="nord")).theme == "nord"
     assert EditorApp(space, EditorSettings(theme="nord"), "gruvbox").theme == "gruvbox"
     assert EditorApp(space).theme == "contextdb-dark"
-
-
-@pytest.mark.parametrize("theme", ["contextdb-dark", "contextdb-light", "ansi-dark", "nord"])
-def test_the_text_of_the_screen_is_the_same_in_every_theme(path, theme):
-    async def script(app, pilot):
-        await press(pilot, "right", "f6")
-        return screen_text(app)
-
-    assert with_editor(path, script, settings=EditorSettings(theme=theme)) == with_editor(path, script)

@@ -13,11 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from strategies import tables
 from terminal import drive, press, screen_text, with_editor
-from terminal import said as said_by
 from textual.app import App
 from textual.pilot import Pilot
 from textual.screen import Screen
-from textual.widgets import Input, OptionList, Select
+from textual.widgets import Input
 
 import contextdb as cdb
 from contextdb.columns import TextColumn
@@ -27,9 +26,9 @@ from contextdb.exchange.importing import Choices
 from contextdb.exchange.mapping import as_job
 from contextdb.exchange.reading import Reading
 from contextdb.tables.table import Table
-from tui.model.importing import Draft, Import, Mode
+from tui.model.importing import Draft, Mode
 from tui.model.sheet import Sheet
-from tui.screens.export_table import Export, ExportDialog
+from tui.screens.export_table import ExportDialog
 from tui.screens.import_table import ImportDialog
 from tui.widgets.line_list import LineList
 
@@ -232,46 +231,6 @@ def exporting(table: Table) -> Callable[[], ExportDialog]:
     return lambda: ExportDialog(table, folder)
 
 
-def test_a_path_is_completed_read_and_imported_with_the_keys_alone(table: Table):
-    async def script(pilot: Pilot[Any]) -> None:
-        await pilot.press("m", "tab")
-        await pilot.pause()
-        assert pilot.app.screen.query_one("#import-path", Input).value == "more.csv"
-        await pilot.press("enter")
-        await settled(pilot)
-        text = screen_text(pilot.app)
-        assert "2 rows in the file: 1 added, 1 here already." in text
-        assert "+ new enum" in text
-        assert "semicolons between the fields" in text
-        await pilot.press("f6")
-
-    [answer], _ = played(importing(table), script)
-    assert isinstance(answer, Import)
-    assert texts(answer.edit.apply(table))["Depth"] == ["", "CB", "", "FS"]
-    assert any("Semicolons" in note for note in answer.notes)
-
-
-def test_a_broken_file_stays_in_the_dialog_with_its_reason(table: Table):
-    async def script(pilot: Pilot[Any]) -> None:
-        await read_file(pilot, "broken.xlsx")
-        await pilot.press("f6")
-
-    answers, text = played(importing(table), script)
-    assert not answers
-    assert "✗ the workbook is broken" in text
-    _, text = played(importing(table), lambda pilot: read_file(pilot, "moer.csv"))
-    assert "✗ there is no such file. Did you mean" in text
-
-
-def test_without_a_file_nothing_is_imported(table: Table):
-    async def script(pilot: Pilot[Any]) -> None:
-        await pilot.press("f6")
-
-    answers, text = played(importing(table), script)
-    assert not answers
-    assert "✗ Choose a file first." in text
-
-
 def test_a_sheet_is_chosen_where_a_workbook_has_several(table: Table):
     async def script(pilot: Pilot[Any]) -> None:
         await read_file(pilot, "book.xlsx")
@@ -326,24 +285,6 @@ def test_rows_and_decimals_are_asked_for_once_and_the_next_file_of_that_name_is_
     assert (after.assets[3:], after.text(4, "speed")) == (["sprint", "hop"], "2.5")
 
 
-def test_the_sheet_of_rows_is_looked_through_sideways_as_far_as_its_last_column(table: Table):
-    assert table.path is not None
-    names = [f"fact {at:02}" for at in range(30)]
-    (table.path.parent / "work" / "wide.csv").write_text(f"{','.join(['Asset', *names])}\n{','.join(['jog', *'1' * 30])}\n")
-
-    async def script(pilot: Pilot[Any]) -> None:
-        await read_file(pilot, "wide.csv")
-        await pilot.press("f4", "right")
-        await pilot.pause()
-        assert "Asset" not in screen_text(pilot.app).partition("Row ")[2]
-        assert "fact 00" in screen_text(pilot.app)
-        await pilot.press(*["right"] * 40)
-
-    text = played(importing(table), script)[1]
-    assert "fact 29" in text
-    assert "fact 25" in text  # the columns before it stay, as many as there is room for
-
-
 NAMES_SAID = 'column "where": each text is one name, such as "Mid Air"; Names, "each word is a name", reads each word as a name.'
 
 
@@ -365,64 +306,6 @@ def test_a_table_of_ours_keeps_its_cells_where_nothing_else_is_chosen(table: Tab
     for names, cell in ((None, "Mid Air"), ("whole", '"Mid Air"')):
         found = Draft.read(table, ours.read_bytes(), str(ours), ReadOptions(), Choices(names=names or ""))
         assert texts(found.edit().apply(table))["where"][1] == cell
-
-
-def test_how_names_are_read_is_chosen_in_the_dialog(table: Table):
-    assert table.path is not None
-    (table.path.parent / "work" / "names.csv").write_text("name;where\nhop;Mid Air\n", encoding="utf-8")
-
-    async def script(pilot: Pilot[Any]) -> None:
-        await read_file(pilot, "names.csv")
-        assert 'each text is one name, such as "Mid Air"' in screen_text(pilot.app)
-        pilot.app.screen.query_one("#import-texts", Select).value = "words"
-        await pilot.pause()
-        await settled(pilot)
-        assert "one name, such as" not in screen_text(pilot.app)
-        await pilot.press("f6")
-
-    [answer], _ = played(importing(table), script)
-    assert answer.edit.apply(table).text(3, "where") == "Mid Air"
-
-
-def test_enter_on_a_column_shows_all_that_it_may_become(table: Table):
-    async def script(pilot: Pilot[Any]) -> None:
-        await read_file(pilot, "more.csv")
-        await pilot.press("down", "down", "enter")
-        await pilot.pause()
-        text = screen_text(pilot.app)
-        assert "What Depth becomes" in text
-        options = pilot.app.screen.query_one(OptionList)
-        assert str(options.get_option_at_index(options.highlighted or 0).prompt).startswith("new condition, enum ")
-        await pilot.press(*"(left", "enter")
-        await pilot.pause()
-        assert "(left out)" in screen_text(pilot.app)
-        await pilot.press("f6")
-
-    [answer], _ = played(importing(table), script)
-    assert [c.name for c in answer.edit.apply(table).columns] == ["Asset Name", "speed"]
-
-
-def test_the_rows_may_replace_those_of_the_table(table: Table):
-    async def script(pilot: Pilot[Any]) -> None:
-        await read_file(pilot, "more.csv")
-        pilot.app.screen.query_one("#import-mode", Select).value = "replace"
-        await pilot.pause()
-        assert "2 rows in the file: 1 added, 1 here already, 2 taken away." in screen_text(pilot.app)
-        await pilot.press("f6")
-
-    [answer], _ = played(importing(table), script)
-    assert answer.edit.apply(table).assets == ["run", "sprint"]
-
-
-def test_a_file_that_changes_nothing_is_told_and_the_dialog_stays(table: Table):
-    async def script(pilot: Pilot[Any]) -> None:
-        await read_file(pilot, "../moves.csv")
-        assert "3 rows in the file: 3 here already." in screen_text(pilot.app)
-        await pilot.press("f6")
-
-    answers, text = played(importing(table), script)
-    assert not answers
-    assert "Nothing would change: the table says all of this already." in text
 
 
 def test_the_clipboard_is_imported_without_a_path(table: Table):
@@ -450,53 +333,15 @@ def test_escape_leaves_and_everything_has_room(table: Table, size: tuple[int, in
     assert answers == [None]
 
 
-def test_an_export_gives_the_bytes_of_the_format_that_the_name_tells(table: Table):
+def test_a_path_that_no_system_has_is_not_exported_to(table: Table):
     async def script(pilot: Pilot[Any]) -> None:
-        entry = pilot.app.screen.query_one("#export-path", Input)
-        assert entry.value == "moves.xlsx"
-        entry.value = "moves.json"
-        await pilot.press("enter")
-
-    [answer], _ = played(exporting(table), script)
-    assert isinstance(answer, Export)
-    assert answer.path.name == "moves.json"
-    assert answer.raw.startswith(b'[\n{"Asset Name": "jog"')
-
-
-@pytest.mark.parametrize(("keys", "is_written"), [(("enter",), True), (("escape", "escape"), False), (("n", "escape"), False)])
-def test_an_export_asks_before_it_writes_over_a_file(table: Table, keys: tuple[str, ...], is_written: bool):
-    async def script(pilot: Pilot[Any]) -> None:
-        pilot.app.screen.query_one("#export-path", Input).value = "more.csv"
-        await pilot.press("enter")
-        await pilot.pause()
-        assert '"more.csv" is there already. Write over it?' in screen_text(pilot.app)
-        for key in keys:
-            await pilot.press(key)
-            await settled(pilot)
-
-    [answer], _ = played(exporting(table), script)
-    assert (answer is not None) is is_written
-
-
-@pytest.mark.parametrize(
-    ("path", "said"),
-    [
-        ("no/x.csv", "✗ There is no folder"),
-        ("x.xslx", "✗ a file that ends in"),
-        (".", "✗ This is a folder; a file is wanted."),
-        ("../moves.csv", "✗ This is the open table itself; Ctrl+S saves it."),
-        ("x\0.csv", "✗ This is not the path of a file."),
-    ],
-)
-def test_a_path_that_cannot_be_exported_to_stays_with_its_reason(table: Table, path: str, said: str):
-    async def script(pilot: Pilot[Any]) -> None:
-        pilot.app.screen.query_one("#export-path", Input).value = path
+        pilot.app.screen.query_one("#export-path", Input).value = "x\0.csv"
         await pilot.press("f6")
         await settled(pilot)
 
     answers, text = played(exporting(table), script)
     assert not answers
-    assert said in text
+    assert "✗ This is not the path of a file." in text
 
 
 def test_the_names_of_an_export_are_completed_chosen_and_gone_through(table: Table):
@@ -541,19 +386,6 @@ def test_an_import_goes_into_a_folder_and_leaves_a_path_that_is_none(table: Tabl
     assert folder == "../"
     assert none == "m\0re.csv"
     assert chosen in ("book.xlsx", "broken.xlsx", "more.csv")
-
-
-def test_the_editor_writes_an_export_and_says_so(table: Table):
-    async def script(app: Any, pilot: Pilot[Any]) -> str:
-        app.main.action_export()
-        await pilot.pause()
-        app.screen.query_one("#export-path", Input).value = "work/out.tsv"
-        await pilot.press("enter")
-        await settled(pilot)
-        return said_by(app)
-
-    assert with_editor(table.path, script) == "Wrote out.tsv."
-    assert (table.path.parent / "work" / "out.tsv").read_text("utf-8").splitlines()[0] == "Asset Name\tspeed"
 
 
 @pytest.mark.parametrize("where", ["read", "answer"])

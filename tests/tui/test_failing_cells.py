@@ -1,9 +1,6 @@
 """Cells that fail: counted in the gutter, pointed at from the edges, and gone to by a key."""
 
-from pathlib import Path
-
 import pytest
-from terminal import press, said, screen_text, with_editor
 
 from contextdb.columns import TextColumn
 from contextdb.schema.settings import Schema, TableSettings, conditions_from_dict
@@ -62,43 +59,3 @@ def test_where_none_fails_there_is_nothing_to_go_to():
     sheet = Sheet(Table.from_columns({"Asset": ["a"], "hit": ["Any"]}, SCHEMA))
     sheet.set_fact("hit", "True")
     assert sheet.next_failing() is None
-
-
-@pytest.fixture
-def wide(tmp_path: Path) -> Path:
-    names = [f"condition_{at}" for at in range(12)]
-    rows = ["a," + ",".join(["False"] * 12), "b," + ",".join(["Any"] * 11 + ["False"])]
-    file = tmp_path / "t.csv"
-    file.write_text("\n".join([",".join(["Asset", *names]), *rows]) + "\n")
-    return file
-
-
-def test_the_gutter_counts_and_the_edges_point(wide):
-    async def script(app, pilot):
-        sheet = app.main.session.sheet
-        for at in (0, 1, 11):
-            sheet.set_fact(f"condition_{at}", "True")
-        app.main.show()
-        await press(pilot)
-        at_first = screen_text(app).splitlines()
-        await press(pilot, "end")
-        at_end = screen_text(app).splitlines()
-        return [next(line for line in lines if row in line) for lines in (at_first, at_end) for row in ("1 ×", "2 ×")]
-
-    first, second, first_at_end, second_at_end = with_editor(wide, script)
-    assert first.startswith("1 ×3 ")
-    assert second.startswith("2 ×1 ")
-    assert ("»" in second, "«" in second) == (True, False)
-    assert ("»" in first_at_end, "«" in first_at_end) == (False, True)
-    assert "«" not in second_at_end
-
-
-def test_the_keys_go_there(wide):
-    async def script(app, pilot):
-        app.main.session.sheet.set_fact("condition_11", "True")
-        await press(pilot, "alt+n")
-        first = app.main.session.sheet.cursor
-        await press(pilot, "alt+n", "alt+v", "alt+v")
-        return first, app.main.session.sheet.cursor, said(app)
-
-    assert with_editor(wide, script) == ((0, 12), (1, 12), "")

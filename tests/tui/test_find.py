@@ -1,14 +1,10 @@
 """Find and replace over the cells of a sheet."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from strategies import tables
-from terminal import press, with_editor
-from textual.widgets import Input
 
 from contextdb.tables.table import Table
 from tui.model.find import PatternError, Search, find, next_hit, replace_all
@@ -86,14 +82,3 @@ def test_the_next_hit_goes_round_both_ways():
     assert next_hit(hits, (0, 1), is_backwards=True) == (2, 0)
     assert next_hit(hits, (2, 0), is_backwards=True) == (0, 1)
     assert next_hit(hits & False, (0, 0)) is None
-
-
-def test_tab_leads_from_the_text_to_what_replaces_it(tmp_path: Path):
-    (tmp_path / "t.csv").write_text("Asset,x\njog,1\nrun,2\njog,3\n")
-
-    async def script(app, pilot):
-        await press(pilot, "ctrl+f", *"jog", "tab", *"trot", "alt+a", "shift+tab", "end", "q")
-        assert app.main.query_one("#find-text", Input).value == "jogq"
-        return app.main.session.sheet.table.assets
-
-    assert with_editor(tmp_path / "t.csv", script) == ["trot", "run", "trot"]

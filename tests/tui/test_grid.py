@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from rich.style import Style
 from saved_bytes import bytes_for
 from strategies import examples, some
-from terminal import press, said, screen_text, with_editor
+from terminal import press, screen_text, with_editor
 from textual.strip import Strip
 
 from contextdb.columns import TextColumn
@@ -83,27 +83,6 @@ def part(strip: Strip, text: str) -> tuple[str, str]:
 
 
 # ---- painting
-
-
-def test_backspace_edits_one_cell_empty_and_never_clears_a_block_where_ctrl_h_comes_as_backspace(tmp_path):
-    path = tmp_path / "t.csv"
-    path.write_text(TABLES["ordinary"])
-
-    async def script(app, pilot):
-        await press(pilot, "shift+right", "shift+down", "backspace")
-        is_open = app.main.assets.editor is not None
-        await press(pilot, "escape")
-        is_modified = app.main.session.sheet.is_modified
-        await press(pilot, "escape", "right", "backspace", "enter")
-        sheet = app.main.session.sheet
-        one = [sheet.text(row, column) for row in range(2) for column in range(2)]
-        await press(pilot, "shift+up", "delete")
-        return is_open, is_modified, one, [sheet.text(row, 1) for row in range(3)]
-
-    is_open, is_modified, one, column = with_editor(path, script)
-    assert (is_open, is_modified) == (True, False)
-    assert one == ["walk", "", "run", "2..6"]
-    assert column == ["", "", "Any"]
 
 
 def test_three_lines_of_headers_say_name_type_unit_and_how_many_rows_the_fact_leaves():
@@ -282,89 +261,6 @@ def test_every_table_opens_moves_and_edits_in_every_window(tmp_path, name, size)
     assert not is_modified
 
 
-def test_a_window_too_small_for_anything_shows_what_fits(ordinary):
-    async def script(app, pilot):
-        await pilot.resize_terminal(5, 3)
-        await press(pilot, "down", "x", "escape")
-        await pilot.resize_terminal(80, 24)
-        await press(pilot, "down")
-        return screen_text(app)
-
-    assert "walk" in with_editor(ordinary, script)
-
-
-def test_scrolling_by_keys_begins_at_a_columns_first_cell(tmp_path):
-    file = tmp_path / "wide.csv"
-    file.write_text("Asset," + ",".join(f"column_{i}" for i in range(20)) + "\nwalk" + ",Any" * 20 + "\n")
-
-    async def script(app, pilot):
-        begins = []
-        for key in ["right"] * 9 + ["left"] * 4 + ["end", "home", "ctrl+end", "left"]:
-            await press(pilot, key)
-            grid = app.main.assets.grid
-            begins.append(round(grid.scroll_x) in {at - grid.grid_layout.frozen for at in grid.grid_layout.starts})
-        return begins
-
-    assert all(with_editor(file, script))
-
-
-def test_home_shows_the_first_columns_again(tmp_path):
-    file = tmp_path / "wide.csv"
-    file.write_text("Asset," + ",".join(f"column_{i}" for i in range(20)) + "\nwalk" + ",Any" * 20 + "\n")
-
-    async def script(app, pilot):
-        await press(pilot, "end", "home")
-        return app.main.assets.grid.scroll_x
-
-    assert with_editor(file, script) == 0
-
-
-def test_the_cursor_stays_in_sight_when_the_window_becomes_smaller(tmp_path):
-    file = tmp_path / "long.csv"
-    file.write_text("Asset\n" + "".join(f"clip_{i}\n" for i in range(100)))
-
-    async def script(app, pilot):
-        await press(pilot, *["down"] * 16)
-        await pilot.resize_terminal(80, 14)
-        await press(pilot)
-        return screen_text(app)
-
-    assert "clip_16" in with_editor(file, script).split("clip_16", 1)[1]
-
-
-def test_up_from_the_first_row_goes_to_the_test_row_and_down_to_the_first_row_that_is_seen(ordinary):
-    async def script(app, pilot):
-        grid = app.main.assets.grid
-        await press(pilot, "right", "up", "up")
-        there = grid.is_in_test_row
-        await press(pilot, "down")
-        return there, grid.is_in_test_row, app.main.session.sheet.cursor
-
-    assert with_editor(ordinary, script) == (True, False, (0, 1))
-
-
-def test_a_column_that_is_no_condition_has_no_fact(tmp_path):
-    file = tmp_path / "one.csv"
-    file.write_text("Asset\nwalk\n")
-
-    async def script(app, pilot):
-        await press(pilot, "f6", "x")
-        return said(app), app.main.session.sheet.table.columns[0].to_list()
-
-    assert with_editor(file, script) == ("Only conditions have a fact to test with.", ["walk"])
-
-
-def test_where_there_is_no_row_what_is_typed_makes_the_first(tmp_path):
-    file = tmp_path / "none.csv"
-    file.write_text("Asset,hit\n")
-
-    async def script(app, pilot):
-        await press(pilot, "x", "enter")
-        return app.main.session.sheet.table.columns[0].to_list()
-
-    assert with_editor(file, script) == ["x"]
-
-
 def test_what_is_typed_faster_than_an_editor_opens_is_all_in_it(ordinary):
     """As a terminal sends it over a slow line: many keys at once, then a paste."""
     from textual.events import Key, Paste
@@ -398,41 +294,6 @@ def test_what_is_typed_right_after_a_key_that_opens_a_bar_or_a_dialog_goes_there
     assert with_editor(ordinary, script) == ((2, 0), False)
 
 
-def test_pasting_from_the_clipboard_is_shown_and_told_at_once(ordinary):
-    async def script(app, pilot):
-        await press(pilot, "ctrl+c", "down", "ctrl+v")
-        return screen_text(app), said(app)
-
-    shown, told = with_editor(ordinary, script)
-    assert "ordinary *" in shown
-    assert told == "Paste 1 × 1."
-
-
-def test_the_foot_says_what_a_filter_and_a_fact_leave(ordinary):
-    async def script(app, pilot):
-        await press(pilot, "ctrl+l", "u", "m", "p", "enter")
-        filtered = screen_text(app)
-        await press(pilot, "right", "f6", "1", "enter", "right")
-        return filtered, screen_text(app)
-
-    filtered, asked = with_editor(ordinary, script)
-    assert "1 of 3 rows shown" in filtered
-    assert "2 valid" in asked
-
-
-def test_a_grid_behind_another_tab_is_not_scrolled_by_an_edit_there(tmp_path):
-    file = tmp_path / "long.csv"
-    file.write_text("Asset,hit\n" + "".join(f"clip_{i},Any\n" for i in range(9)))
-
-    async def script(app, pilot):
-        await press(pilot, "down", "alt+2", "ctrl+z", "alt+1")
-        return app.main.assets.grid.scroll_y, screen_text(app)
-
-    top, shown = with_editor(file, script)
-    assert top == 0
-    assert "clip_0" in shown
-
-
 VERB_KEYS = [c.keys.split(",")[0] for c in GRID if c.keys and c.id not in ("redo",)]
 
 
@@ -452,45 +313,3 @@ def test_whatever_is_pressed_undoing_all_gives_the_same_bytes(keys, tmp_path_fac
         return bytes_for(sheet.table, file)
 
     assert with_editor(file, script) == file.read_bytes()
-
-
-def test_after_a_paste_of_many_rows_one_stays_where_one_was(tmp_path):
-    file = tmp_path / "t.csv"
-    file.write_text("Asset,note\n" + "".join(f"a{at},x\n" for at in range(300)))
-
-    async def script(app, pilot):
-        grid = app.main.assets.grid
-        grid.paste("\n".join(f"b{at}" for at in range(200)))
-        await press(pilot)
-        pasted = grid.look.top, app.main.session.sheet.cursor[0]
-        await press(pilot, *["shift+down"] * 3)
-        return pasted, grid.look.top > 0
-
-    assert with_editor(file, script) == ((0, 0), True)
-
-
-def test_a_selection_of_filtered_rows_does_not_grow_when_all_are_shown(tmp_path):
-    file = tmp_path / "t.csv"
-    file.write_text("Asset,note\n" + "".join(f"a{at},{'x' if at % 2 else 'y'}\n" for at in range(8)))
-
-    async def script(app, pilot):
-        sheet = app.main.session.sheet
-        await press(pilot, "right", "alt+e", "shift+down", "shift+down")
-        before = sheet.selected_rows
-        await press(pilot, "alt+g")
-        return before, sheet.selected_rows
-
-    assert with_editor(file, script) == ([0, 2, 4], [0])
-
-
-def test_a_column_that_was_added_has_the_cursor_so_that_the_next_comes_behind_it(tmp_path):
-    (tmp_path / "contextdb.toml").write_text('[conditions.hit]\ntype = "bool"\n[conditions.way]\ntype = "angle"\n')
-    file = tmp_path / "t.csv"
-    file.write_text("Asset,note,last\nwalk,x,y\n")
-
-    async def script(app, pilot):
-        for name in ("hit", "way"):
-            await press(pilot, "alt+c", *name, "enter")
-        return [c.name for c in app.main.session.sheet.table.columns]
-
-    assert with_editor(file, script) == ["Asset", "hit", "way", "note", "last"]

@@ -5,14 +5,11 @@ from pathlib import Path
 import pytest
 from terminal import press, screen_text, settled, with_editor
 from textual.events import MouseScrollDown, MouseScrollUp
-from textual.widgets import Input
 
 from tui.app import EditorApp
-from tui.model.layout import NARROWEST
 from tui.model.selection import Block
 from tui.widgets.bar import Bar
 from tui.widgets.editing.choice_list import ChoiceList
-from tui.widgets.grid import Grid
 
 
 @pytest.fixture
@@ -45,35 +42,6 @@ async def click(pilot, place: tuple[int, int], **more: object) -> None:
 
 def block(app: EditorApp) -> Block:
     return app.main.session.sheet.block
-
-
-def width_of(grid: Grid, column: int) -> int:
-    return grid.grid_layout.widths[column]
-
-
-def test_a_click_puts_the_cursor_on_the_cell_under_it(path):
-    async def script(app, pilot):
-        await click(pilot, at(app, 4, 2))
-        return app.main.session.sheet.cursor
-
-    assert with_editor(path, script) == (4, 2)
-
-
-def test_a_click_with_shift_selects_up_to_there(path):
-    async def script(app, pilot):
-        await click(pilot, at(app, 1, 1))
-        await click(pilot, at(app, 4, 2), shift=True)
-        return block(app), app.main.session.sheet.cursor
-
-    assert with_editor(path, script) == (Block(1, 1, 5, 3), (1, 1))
-
-
-def test_a_drag_selects_backwards_too(path):
-    async def script(app, pilot):
-        await drag(pilot, at(app, 6, 2), at(app, 4, 1), at(app, 2, 1))
-        return block(app)
-
-    assert with_editor(path, script) == Block(2, 1, 7, 3)
 
 
 def test_a_drag_past_the_foot_makes_the_rows_come_after_the_mouse(path):
@@ -149,123 +117,6 @@ def test_moving_the_mouse_without_a_button_selects_nothing(path):
     assert with_editor(path, script) == Block(1, 1, 3, 3)
 
 
-def test_a_click_on_a_header_selects_the_column_and_shift_more_of_them(path):
-    async def script(app, pilot):
-        await click(pilot, at(app, -3, 1))
-        one = block(app)
-        await click(pilot, at(app, -3, 2), shift=True)
-        return one, block(app)
-
-    assert with_editor(path, script) == (Block(0, 1, 40, 2), Block(0, 1, 40, 3))
-
-
-def test_a_drag_over_headers_selects_whole_columns(path):
-    async def script(app, pilot):
-        await drag(pilot, at(app, -3, 1), at(app, -3, 2))
-        return block(app)
-
-    assert with_editor(path, script) == Block(0, 1, 40, 3)
-
-
-def test_a_click_on_a_row_number_selects_the_row_and_a_drag_more_of_them(path):
-    async def script(app, pilot):
-        x = app.main.assets.grid.content_region.x
-        await click(pilot, (x, at(app, 3, 0)[1]))
-        one = block(app)
-        await drag(pilot, (x, at(app, 4, 0)[1]), (x, at(app, 6, 0)[1]))
-        return one, block(app)
-
-    assert with_editor(path, script) == (Block(3, 0, 4, 3), Block(4, 0, 7, 3))
-
-
-def test_the_sign_of_a_header_sorts_up_then_down_then_as_in_the_file(path):
-    async def script(app, pilot):
-        grid = app.main.assets.grid
-        sorts = []
-        for _ in range(3):
-            place = at(app, -3, 1)
-            await click(pilot, (place[0] + width_of(grid, 1) - 2, place[1]))
-            sort = app.main.session.sheet.sort
-            sorts.append(sort and (sort.column, sort.is_descending))
-        return sorts, app.main.session.sheet.is_modified
-
-    assert with_editor(path, script) == ([("speed", False), ("speed", True), None], False)
-
-
-def test_dragging_the_line_behind_a_header_changes_the_width_of_its_column(path):
-    async def script(app, pilot):
-        grid = app.main.assets.grid
-        before = width_of(grid, 1)
-        x, y = at(app, -3, 1)
-        line = x - 1 + before
-        await drag(pilot, (line, y), (line + 5, y), (line + 9, y))
-        wider = width_of(grid, 1) - before
-        await drag(pilot, (line + 9, y), (x - 1, y), (0, y))
-        return wider, width_of(grid, 1), app.main.session.sheet.sort, app.main.session.sheet.is_modified
-
-    assert with_editor(path, script) == (9, NARROWEST, None, False)
-
-
-def test_the_width_of_a_narrowed_frozen_column_follows_the_mouse(tmp_path):
-    file = tmp_path / "t.csv"
-    file.write_text("Asset,hit\n" + "x" * 70 + ",True\n")
-
-    async def script(app, pilot):
-        grid = app.main.assets.grid
-        x, y = at(app, -3, 0)
-        line = x - 1 + width_of(grid, 0)
-        await drag(pilot, (line, y), (line - 4, y))
-        return line - 4 - (x - 1), width_of(grid, 0)
-
-    wanted, found = with_editor(file, script)
-    assert found == wanted
-
-
-def test_a_double_click_on_the_line_fits_the_column_to_its_texts(path):
-    async def script(app, pilot):
-        grid = app.main.assets.grid
-        before = width_of(grid, 1)
-        x, y = at(app, -3, 1)
-        await drag(pilot, (x - 1 + before, y), (x + 30, y))
-        await pilot.click(offset=(x - 1 + width_of(grid, 1), y), times=2)
-        await settled(pilot)
-        return before, width_of(grid, 1)
-
-    before, after = with_editor(path, script)
-    assert before == after
-
-
-def test_a_double_click_edits_the_cell(path):
-    async def script(app, pilot):
-        await pilot.click(offset=at(app, 2, 1), times=2)
-        await settled(pilot)
-        return app.main.assets.editor is not None, app.main.session.sheet.cursor
-
-    assert with_editor(path, script) == (True, (2, 1))
-
-
-def test_a_double_click_below_the_last_row_edits_nothing(tmp_path):
-    file = tmp_path / "t.csv"
-    file.write_text("Asset,hit\nwalk,True\n")
-
-    async def script(app, pilot):
-        await pilot.click(offset=at(app, 8, 1), times=2)
-        await settled(pilot)
-        return app.main.assets.editor
-
-    assert with_editor(file, script) is None
-
-
-def test_a_click_in_the_test_row_goes_there_and_one_in_the_rows_comes_back(path):
-    async def script(app, pilot):
-        await click(pilot, at(app, -1, 1))
-        there = app.main.assets.grid.is_in_test_row
-        await click(pilot, at(app, 0, 2))
-        return there, app.main.assets.grid.is_in_test_row
-
-    assert with_editor(path, script) == (True, False)
-
-
 def test_the_wheel_scrolls_the_rows_and_leaves_the_cursor(path):
     from textual.events import MouseScrollDown
 
@@ -283,45 +134,6 @@ def test_the_wheel_scrolls_the_rows_and_leaves_the_cursor(path):
     assert cursor == (0, 0)
 
 
-def test_a_click_elsewhere_while_a_cell_is_edited_takes_its_text(path):
-    async def script(app, pilot):
-        await click(pilot, at(app, 2, 1))
-        await press(pilot, "7")
-        await click(pilot, at(app, 9, 2))
-        sheet = app.main.session.sheet
-        return sheet.text(2, 1), sheet.cursor
-
-    assert with_editor(path, script) == ("7", (9, 2))
-
-
-def test_clicks_on_an_empty_table_change_nothing(tmp_path):
-    file = tmp_path / "t.csv"
-    file.write_text("Asset,hit\n")
-
-    async def script(app, pilot):
-        for place in [at(app, -3, 0), at(app, 0, 1), at(app, 5, 1), at(app, -1, 1), (0, at(app, 0, 0)[1])]:
-            await click(pilot, place)
-            await drag(pilot, place, (place[0] + 3, place[1] + 2))
-        return screen_text(app), app.main.session.sheet.is_modified
-
-    shown, is_modified = with_editor(file, script)
-    assert "+    new row" in shown or "+   new" in shown
-    assert not is_modified
-
-
-def test_a_click_on_a_tab_and_on_a_tool_does_what_its_key_does(path):
-    async def script(app, pilot):
-        lines = screen_text(app).splitlines()
-        await click(pilot, (lines[0].index("Options") + 1, 0))
-        tab = app.main.tab
-        await click(pilot, (lines[1].index("Undo history") + 1, 1))
-        return tab, screen_text(app)
-
-    tab, shown = with_editor(path, script, (80, 30))
-    assert tab == "options"
-    assert "the table as it was opened" in shown
-
-
 def test_a_click_on_the_key_line_presses_the_key_and_a_tool_is_lit_under_the_mouse(path):
     async def script(app, pilot):
         lines = screen_text(app).splitlines()
@@ -333,20 +145,6 @@ def test_a_click_on_the_key_line_presses_the_key_and_a_tool_is_lit_under_the_mou
         return app.main.assets.grid.is_in_test_row, lit, tools._hovered
 
     assert with_editor(path, script, (80, 30)) == (True, "history", None)
-
-
-def test_the_buttons_of_find_replace_here_and_everywhere(path):
-    async def script(app, pilot):
-        await press(pilot, "ctrl+f", *"clip")
-        app.main.query_one("#find-replacement", Input).value = "take"
-        seen = []
-        for name in ("replace", "all"):
-            await pilot.click(f"#find-{name}")
-            await settled(pilot)
-            seen.append(sum(asset.startswith("take") for asset in app.main.session.sheet.table.assets))
-        return seen
-
-    assert with_editor(path, script, (120, 30)) == [1, 40]
 
 
 def test_the_wheel_goes_through_a_list_of_values_and_a_click_takes_one(tmp_path):

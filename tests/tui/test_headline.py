@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from terminal import EditorApp, press, screen_text, with_editor
+from terminal import EditorApp, press, with_editor
 
 from contextdb.cells.words import three_digits
 from tui.widgets.bar import CellLine
@@ -15,30 +15,6 @@ def path_of(folder: Path, policy: str) -> Path:
     (folder / "contextdb.toml").write_text(TOML.format(policy=policy))
     (folder / "t.csv").write_text("Asset,Priority,speed,hit\nwalk,2,0..5,Any\nrun,2,3..10,Any\nfall,1,3..10,True\nlie,1,9,True\n")
     return folder / "t.csv"
-
-
-@pytest.mark.parametrize(
-    ("policy", "facts", "line"),
-    [
-        ("collect", {"speed": "4", "hit": "False"}, "plays one of 2 · 2 valid"),
-        ("collect", {"speed": "1", "hit": "False"}, "plays walk · 1 valid"),
-        ("priority", {"speed": "4", "hit": "True"}, "plays one of 2 · 3 valid · 1 outranked"),
-        ("unique", {"speed": "4", "hit": "False"}, "none is picked: the policy is unique · 2 valid"),
-        ("collect", {"speed": "20", "hit": "False"}, "plays the fallback idle · 0 valid"),
-        ("collect", {"speed": "2..4", "hit": "False"}, "plays one of 2 · 1 valid · 1 may be"),
-    ],
-)
-def test_the_line_says_what_plays(tmp_path: Path, policy: str, facts: dict[str, str], line: str) -> None:
-    async def script(app: EditorApp, pilot) -> tuple[str, str]:
-        app.main.assets.set_context(facts, "")
-        await press(pilot, "down")
-        clean = screen_text(app).splitlines()[1].rstrip()
-        await press(pilot, *"x", "enter")
-        return clean, screen_text(app).splitlines()[1].rstrip()
-
-    clean, edited = with_editor(path_of(tmp_path, policy), script, (120, 24))
-    assert clean.endswith(f" {line}")
-    assert edited.endswith(" · unsaved")
 
 
 def test_without_facts_nothing_is_said(tmp_path: Path) -> None:
@@ -83,16 +59,3 @@ def test_rows_that_miss_by_more_than_one_cell_are_dim(tmp_path: Path) -> None:
 )
 def test_a_number_of_a_game_has_three_digits_and_other_texts_are_as_they_are(sent: str, text: str) -> None:
     assert three_digits(sent) == text
-
-
-def test_the_test_row_shows_three_digits_and_the_line_of_the_cell_all(tmp_path: Path) -> None:
-    async def script(app: EditorApp, pilot) -> list[str]:
-        app.main.assets.set_context({"speed": "4.123456789"}, "")
-        await press(pilot, "f6")
-        app.main.assets.go_to_column("speed")
-        await press(pilot, "f6")
-        return screen_text(app).splitlines()
-
-    lines = with_editor(path_of(tmp_path, "collect"), script, (120, 24))
-    assert "4.123456789" in lines[1]
-    assert "4.12 " in next(line for line in lines if line.startswith("?") or line.startswith("     ?") or " ? " in line)

@@ -104,62 +104,6 @@ def test_unticking_an_output_keeps_the_types_of_the_others():
     assert now.output("n") is not None
 
 
-def test_a_picked_setting_is_an_edit_that_undo_takes_back():
-    app = PaneApp(small())
-
-    async def script(pilot):
-        app.query_one("#option-policy", Select).focus()
-        await pilot.press("enter", "down", "enter")
-        await pilot.pause()
-        assert app.sheet.table.settings.policy == "first"
-        app.query_one("#option-enabled", Select).value = "on"
-        await pilot.pause()
-        assert app.sheet.table.enabled.tolist() == [True, False]
-        app.sheet.undo()
-        app.query_one(OptionsPane).show()
-        await pilot.pause()
-        assert app.query_one("#option-enabled", Select).is_blank()
-
-    drive(app, script)
-    assert app.told == ["Set policy of the table", "Set enabled of the table"]
-    assert app.sheet.table.settings.policy == "first"
-
-
-def test_outputs_are_ticked_and_unticked():
-    app = PaneApp(small())
-
-    async def script(pilot):
-        app.query_one("#option-outputs", TickList).focus()
-        await pilot.press("down", "down", "space")
-        await pilot.pause()
-        assert app.sheet.table.settings.outputs == ("slot",)
-        assert "[x] slot" in screen_text(app)
-        await pilot.press("space")
-        await pilot.pause()
-
-    drive(app, script, (80, 40))
-    assert app.sheet.table.settings.outputs == ()
-    assert app.told == ["Set outputs of the table"] * 2
-
-
-def test_a_fallback_is_completed_from_the_assets_and_told_when_no_row_has_it():
-    app = PaneApp(small())
-
-    async def script(pilot):
-        app.query_one("#option-fallback", Input).focus()
-        await pilot.press("w", "a")
-        await pilot.pause()
-        await pilot.press("right", "enter")
-        await pilot.pause()
-        assert app.sheet.table.settings.fallback == "walk"
-        await submit(pilot, "#option-fallback", "stand")
-        assert "No row of this table has it." in app.query_one("#field-fallback", Field).meaning
-        await submit(pilot, "#option-fallback", "")
-
-    drive(app, script)
-    assert app.sheet.table.settings.fallback is None
-
-
 def test_assumptions_are_added_changed_and_taken_away():
     app = PaneApp(small())
 
@@ -189,61 +133,6 @@ def test_assumptions_are_added_changed_and_taken_away():
 
     drive(app, script)
     assert app.sheet.table.settings.assume == ("not on",)
-
-
-def test_a_bad_bound_stays_in_its_field_with_the_reason_and_escape_puts_it_back():
-    app = PaneApp(small())
-
-    async def script(pilot):
-        await submit(pilot, "#condition-min", "fast")
-        assert wrong(app, "min") == '"fast" is not a number.'
-        assert app.query_one("#condition-min", Input).value == "fast"
-        await submit(pilot, "#condition-min", "9")
-        assert "is above" in wrong(app, "min")
-        assert "✗" in screen_text(app)
-        await pilot.press("escape")
-        assert app.query_one("#condition-min", Input).value == ""
-        assert wrong(app, "min") == ""
-        await submit(pilot, "#condition-min", "-1")
-
-    drive(app, script, (160, 42))
-    assert app.sheet.table.condition("speed").condition.domain.minimum == -1.0
-    assert app.told == ["Set min of speed"]
-
-
-def test_a_guessed_condition_is_declared_when_its_form_is_changed():
-    app = PaneApp(small(), column=2)
-
-    async def script(pilot):
-        assert "not declared" in screen_text(app)
-        app.query_one("#condition-type", Select).value = "enum"
-        await pilot.pause()
-        assert "names" in wrong(app, "values") or "values" in wrong(app, "values").lower()
-        await submit(pilot, "#condition-values", 'True False "May be"')
-        return screen_text(app)
-
-    assert "not declared" not in drive(app, script, (160, 42))
-    assert app.sheet.table.schema.conditions["on"].domain.values == ("True", "False", "May be")
-
-
-def test_texts_of_the_table_are_shown_as_they_are():
-    app = PaneApp(Table.from_columns({"[red]A[/]": ["[/]"], "[bold]": ["x"]}))
-
-    async def script(pilot):
-        return screen_text(app)
-
-    text = drive(app, script, (160, 42))
-    assert "Condition [bold]" in text
-    assert "[red]A[/]" in text
-
-
-def test_a_table_without_conditions_has_no_form_for_one():
-    app = PaneApp(Table.from_columns({"Asset": ["a"]}), column=0)
-
-    async def script(pilot):
-        return screen_text(app)
-
-    assert "Condition" not in drive(app, script, (160, 42))
 
 
 # ---- the model
@@ -279,31 +168,6 @@ def test_a_form_says_again_what_its_condition_says(name: str):
     assert ConditionForm.of(Table.from_columns({"A": [], name: []}, {name: said}).condition(name).condition) == form
 
 
-def sided() -> Table:
-    columns = {"Asset": ["walk", "run"], "side": ["Left", "Right"], "lean": ["1..2", "Any"]}
-    schema = {"side": {"type": "enum", "values": ["Left", "Right", "Far Left", "Far Right"]}, "lean": {"type": "number"}}
-    return Table.from_columns(columns, schema)
-
-
-def test_how_a_condition_mirrors_is_typed_as_pairs_or_a_word_and_a_wrong_one_stays_with_the_reason():
-    app = PaneApp(sided())
-
-    async def script(pilot):
-        await submit(pilot, "#condition-mirror", 'Left = Right, "Far Left" = "Far Right"')
-        side = app.sheet.table.condition("side").condition
-        assert side.mirror == (("Left", "Right"), ("Far Left", "Far Right"))
-        assert app.query_one("#condition-mirror", Input).value == 'Left = Right, "Far Left" = "Far Right"'
-        await submit(pilot, "#condition-mirror", "Left = Rigth")
-        assert 'there is no value "Rigth"' in wrong(app, "mirror")
-        await submit(pilot, "#condition-mirror", "negate")
-        assert "has no sign" in wrong(app, "mirror")
-        assert app.sheet.table.condition("side").condition.mirror == side.mirror
-        await submit(pilot, "#condition-mirror", "")
-        assert app.sheet.table.condition("side").condition.mirror is None
-
-    drive(app, script)
-
-
 def test_a_mirror_that_has_no_place_under_another_type_goes_with_the_old_one():
     form = ConditionForm.of(
         Table.from_columns({"A": ["a"], "x": ["1"]}, {"x": {"type": "number", "mirror": "negate"}}).conditions[0].condition
@@ -314,21 +178,3 @@ def test_a_mirror_that_has_no_place_under_another_type_goes_with_the_old_one():
     pairs = ConditionForm("text", mirror="L = R")
     assert pairs.of_kind("tags").declared()[0] == {"type": "tags", "mirror": {"L": "R"}}
     assert pairs.of_kind("bool").declared()[0] == {"type": "bool"}
-
-
-def test_the_weight_of_a_condition_is_typed_and_taken_away():
-    app = PaneApp(sided())
-
-    async def script(pilot):
-        await submit(pilot, "#condition-weight", "2.5")
-        assert app.sheet.table.condition("side").condition.weight == 2.5
-        await submit(pilot, "#condition-weight", "-1")
-        assert "below 0" in app.query_one("#options-condition #field-weight", Field).wrong
-        assert app.query_one("#options-table #field-weight", Field).wrong == ""
-        await submit(pilot, "#condition-weight", "much")
-        assert app.query_one("#options-condition #field-weight", Field).wrong == '"much" is not a number.'
-        assert app.sheet.table.condition("side").condition.weight == 2.5
-        await submit(pilot, "#condition-weight", "")
-        assert app.sheet.table.condition("side").condition.weight == 1.0
-
-    drive(app, script)

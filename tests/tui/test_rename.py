@@ -22,50 +22,6 @@ def folder(tmp_path):
     return write(tmp_path)
 
 
-def test_a_rename_that_would_fork_a_condition_asks_and_escape_changes_nothing(folder):
-    async def script(app, pilot):
-        await press(pilot, "right")
-        await rename(pilot, "velocity")
-        question = screen_text(app)
-        await press(pilot, "escape")
-        return question, app.main.session.sheet.is_modified
-
-    question, is_modified = with_editor(folder / "a.csv", script, (100, 24))
-    assert "speed is used by 1 table, 1 derived fact, 2 assumptions, 1 contract," in question
-    assert "Rename everywhere" in question
-    assert "Only here" in question
-    assert not is_modified
-    assert texts(folder)["contextdb.toml"] == FILES["contextdb.toml"]
-
-
-@pytest.mark.parametrize(("keys", "toml"), [(("enter",), 1), (("down", "enter"), 2)])
-def test_a_rename_is_written_at_once_keeps_the_test_row_and_says_how_to_take_it_back(folder, keys, toml):
-    async def script(app, pilot):
-        app.workspace.session("a").sheet.query.load({"speed": "5", "target": "1"})
-        app.workspace.session("b").sheet.query.load({"speed": "5"})
-        await press(pilot, "right")
-        await rename(pilot, "velocity")
-        await press(pilot, *keys)
-        sheet = app.main.session.sheet
-        found = said(app), sheet.query.texts, sheet.query.n_valid, sheet.is_modified
-        assert sheet.cursor == (0, 1)
-        now = texts(folder)
-        await press(pilot, "ctrl+z", "ctrl+z")
-        nothing = said(app)
-        await press(pilot, "ctrl+y", "ctrl+z")
-        return found, said(app), now, nothing
-
-    (told, facts, n_valid, is_modified), undone, now, nothing = with_editor(folder / "a.csv", script)
-    assert nothing == "There is nothing to undo."
-    assert {name: text for name, text in texts(folder).items() if name in FILES} == FILES
-    assert told.startswith("Renamed speed to velocity")
-    assert "Ctrl+Z takes it back" in told
-    assert (facts, n_valid, is_modified) == ({"velocity": "5", "target": "1"}, 1, False)
-    assert undone == "Undo: Rename speed to velocity."
-    assert now["contextdb.toml"].count("[conditions.speed]") == toml - 1
-    assert ("velocity" in now["b.csv"]) == (toml == 1)
-
-
 def test_a_rename_with_unsaved_edits_asks_to_save_first(folder):
     workspace = Workspace(folder / "a.csv")
     session = workspace.session("a")
@@ -75,18 +31,6 @@ def test_a_rename_with_unsaved_edits_asks_to_save_first(folder):
         workspace.rename("a", renaming(session.sheet.table, "speed", "velocity"), {})
     assert texts(folder)["b.csv"] == FILES["b.csv"]
     workspace.close()
-
-
-def test_a_column_that_nothing_else_names_is_renamed_as_one_step(folder):
-    async def script(app, pilot):
-        await press(pilot, "right", "right")
-        await rename(pilot, "gap")
-        after = [c.name for c in app.main.session.sheet.table.columns]
-        await press(pilot, "ctrl+z")
-        return after, [c.name for c in app.main.session.sheet.table.columns]
-
-    after, undone = with_editor(folder / "a.csv", script)
-    assert (after[2], undone[2]) == ("gap", "closing")
 
 
 def test_a_rename_in_the_base_carries_an_open_variant_and_projects_that_extend_and_is_one_step(tmp_path):

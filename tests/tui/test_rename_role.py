@@ -5,7 +5,6 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from terminal import press, said, screen_text, with_editor
 
 from contextdb.checks.run import check
 from contextdb.edits.renaming_assets import asset_renaming, asset_uses, role_renaming, role_uses
@@ -130,58 +129,3 @@ def test_only_here_an_asset_keeps_its_name_for_others(folder):
 def test_an_asset_that_there_is_already_is_refused(folder):
     with pytest.raises(ContextDBError, match="already"):
         asset_renaming(load_table(folder / "a.csv"), "run", "walk")
-
-
-def test_the_editor_shows_what_uses_the_role_and_ctrl_z_takes_it_back(folder):
-    async def script(app, pilot):
-        app.workspace.session("a").sheet.query.load({"Defender.Depth": "CB"})
-        await press(pilot, "right")
-        await app.main.run_command("rename-role")
-        await press(pilot)
-        await press(pilot, "ctrl+u", *"Marker", "enter")
-        asked = screen_text(app)
-        await press(pilot, "enter")
-        done = said(app), texts(folder)["b.csv"], app.main.session.sheet.query.texts
-        await press(pilot, "ctrl+z")
-        undone = said(app), texts(folder), app.main.session.sheet.query.texts
-        await press(pilot, "ctrl+y")
-        return asked, done, undone, texts(folder)["b.csv"]
-
-    asked, (told, text, facts), (untold, files, first), again = with_editor(folder / "a.csv", script, (110, 30))
-    assert "2 facts, 1 other table" in asked
-    assert "Tables: b." in asked
-    assert told.startswith("Renamed Defender to Marker everywhere, in ")
-    assert text == again == FILES["b.csv"].replace("Defender", "Marker")
-    assert (facts, first) == ({"Marker.Depth": "CB"}, {"Defender.Depth": "CB"})
-    assert untold == "Undo: Rename Defender to Marker."
-    assert files == FILES
-
-
-def test_an_asset_that_nothing_else_names_is_renamed_as_a_step(folder):
-    async def script(app, pilot):
-        await press(pilot, "down")
-        app.main.action_rename_asset()
-        await press(pilot)
-        await press(pilot, "ctrl+u", *"stroll", "enter")
-        asked = screen_text(app)
-        return asked, said(app), list(app.main.session.sheet.table.assets)
-
-    (folder / "a.cases.csv").unlink()
-    _, told, assets = with_editor(folder / "a.csv", script, (110, 30))
-    assert told.startswith("Rename walk to stroll")
-    assert assets == ["run", "stroll"]
-
-
-def test_an_asset_with_uses_asks_and_names_the_clip(folder):
-    async def script(app, pilot):
-        app.main.action_rename_asset()
-        await press(pilot)
-        await press(pilot, "ctrl+u", *"sprint", "enter")
-        asked = screen_text(app)
-        await press(pilot, "escape")
-        return asked
-
-    asked = with_editor(folder / "a.csv", script, (110, 30))
-    assert "run is used by 1 other table, 2 saved contexts, 1 fallback, 1 line" in asked
-    assert 'The clip "run.bvh" keeps its name' in asked
-    assert texts(folder) == FILES

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from hypothesis import given
 from hypothesis import strategies as st
-from terminal import press, screen_text, with_editor
 
 from contextdb.cells.conditions import Condition
 from contextdb.cells.domains import Domain
@@ -71,28 +68,3 @@ def test_what_is_offered_is_facts_values_functions_and_words():
     assert offered["up"] == ["`is up`"]
     assert offered["cl"] == ["clamp("]
     assert offered["speed"] == []
-
-
-def test_the_editor_offers_names_and_says_what_holds_now(tmp_path: Path):
-    toml = '[conditions.speed]\ntype = "number"\n[conditions.gait]\ntype = "enum"\nvalues = ["Walk", "Run"]\n'
-    (tmp_path / "contextdb.toml").write_text(toml + '[tables.t]\nwhen = "Rule"\n')
-    (tmp_path / "t.csv").write_text("Asset,speed,gait,Rule\nrun,0..9,Any,\n")
-
-    async def script(app, pilot):
-        app.main.assets.set_context({"speed": "4.5", "gait": "Walk"}, "")
-        await press(pilot, "end", *"sp")
-        offered = screen_text(app)
-        await press(pilot, "ctrl+t", *' > 3 and gait == "R')
-        values = screen_text(app)
-        await press(pilot, "ctrl+t")
-        said = screen_text(app)
-        await press(pilot, "enter")
-        return offered, values, said, app.main.session.sheet.table.text(0, "Rule")
-
-    offered, values, said, rule = with_editor(tmp_path / "t.csv", script, (140, 24))
-    assert "Ctrl+T speed" in offered
-    assert 'Ctrl+T "Run"' in values
-    assert "✓ speed > 3: true now (speed is 4.5)" in said
-    assert '✗ gait == "Run": false now (gait is Walk)' in said
-    assert "The rule is false now." in said
-    assert rule == 'speed > 3 and gait == "Run"'

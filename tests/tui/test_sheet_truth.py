@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from nested_tables import flat_rows
 from running import run
-from terminal import press, said, screen_text, with_editor
+from terminal import press, screen_text, with_editor
 from warm_start import python
 
 import contextdb as cdb
@@ -243,37 +243,6 @@ def test_a_computed_fact_that_lacks_a_fact_says_which(tmp_path):
     sheet.query.load({"speed": "3"})
     [cell] = [cell for cell in why_row(sheet.query, sheet.table, 0).cells if cell.column == "closing"]
     assert (cell.state, cell.fact) == ("not given", 'needs "target"')
-
-
-def test_typing_into_a_computed_fact_says_why_it_cannot_be_typed(tmp_path):
-    SAMPLE.write(tmp_path)
-
-    async def script(app, pilot):
-        await press(pilot, "right", "f6", "home", "right", "7")
-        refused = said(app), app.main.assets.editor
-        await press(pilot, "delete")
-        return refused, dict(app.main.session.sheet.query.texts)
-
-    (text, editor), texts = with_editor(tmp_path / "outer.csv", script)
-    assert text == 'closing is computed: speed - target. Type the facts that it is computed from: "speed", "target".'
-    assert editor is None
-    assert "closing" not in texts
-
-
-def test_facts_that_no_column_asks_for_are_typed_at_the_right_of_the_test_row(tmp_path):
-    SAMPLE.write(tmp_path)
-
-    async def script(app, pilot):
-        await press(pilot, "f6", "right", "right", "3", "enter", "right", "2", "enter", "home", "end")
-        there = app.main.assets.grid.cell_text(), screen_text(app)
-        await press(pilot, "home", "f6")
-        return there, dict(app.main.session.sheet.query.texts), app.main.assets.grid.field
-
-    (last, screen), texts, field = with_editor(tmp_path / "outer.csv", script, (120, 24))
-    assert {name: text for name, text in texts.items() if text} == {"speed": "3", "target": "2"}
-    assert last == "2"
-    assert "no column" in screen
-    assert field == 0
 
 
 def test_a_saved_context_keeps_the_facts_of_rules_and_what_query_says(tmp_path):

@@ -58,53 +58,6 @@ def test_a_screen_that_is_made_smaller_and_larger_stays_what_it_is(path, scene):
     assert now == was
 
 
-def test_in_a_terminal_of_80_columns_and_24_lines_five_columns_are_whole_and_fourteen_rows_are_seen(path):
-    async def script(app, pilot):
-        return screen_text(app).splitlines()
-
-    lines = with_editor(path, script)
-    rows = [line for line in lines if line[:2].strip().isdigit()]
-    assert len(rows) >= 14
-    assert all(line.count("│") >= 5 for line in rows)
-    assert [line.count("Commands") for line in (lines[0], lines[-1])] == [1, 0]
-
-
-def test_in_a_terminal_of_160_columns_all_nine_columns_are_whole(path):
-    async def script(app, pilot):
-        return screen_text(app).splitlines()
-
-    assert next(line for line in with_editor(path, script, (160, 48)) if line.startswith(" 1 ")).count("│") == 9
-
-
-def test_in_a_terminal_of_20_columns_and_8_lines_there_are_names_rows_the_test_row_and_keys(path):
-    async def script(app, pilot):
-        return screen_text(app).splitlines()
-
-    lines = with_editor(path, script, (20, 8))
-    assert "row 1" in lines[1]
-    assert "↕" in lines[2]
-    assert [line.split()[0] for line in lines[3:6]] == ["?", "1", "2"]
-    assert "F2 Edit" in lines[-1]
-
-
-def test_the_rows_can_be_gone_through_in_a_terminal_of_20_columns_and_8_lines(path):
-    async def script(app, pilot):
-        await press(pilot, *["down"] * 6, "right")
-        return screen_text(app).splitlines()
-
-    lines = with_editor(path, script, (20, 8))
-    assert "row 7" in lines[1]
-    assert any(line.split()[:1] == ["7"] for line in lines[3:6])
-
-
-def test_a_cell_is_edited_in_a_terminal_of_20_columns_and_8_lines(path):
-    async def script(app, pilot):
-        await press(pilot, "right", "t", "enter")
-        return app.main.session.sheet.text(0, 1)
-
-    assert with_editor(path, script, (20, 8)) == "True"
-
-
 @pytest.mark.parametrize("command", some(["actors", "contexts", "import", "export"], 4))
 def test_a_dialog_with_few_lines_is_no_higher_than_they_need(path, command):
     async def script(app, pilot):
@@ -116,17 +69,6 @@ def test_a_dialog_with_few_lines_is_no_higher_than_they_need(path, command):
     assert [with_editor(file, script, size) <= most for size, most in (((120, 36), 24), ((160, 48), 24), ((80, 24), 22))] == [
         True
     ] * 3
-
-
-def test_a_dialog_does_not_become_lower_while_one_types(path):
-    async def script(app, pilot):
-        await press(pilot, "f9")
-        before = app.screen.query_one("#dialog").size.height
-        await press(pilot, *"no such context")
-        return before, app.screen.query_one("#dialog").size.height
-
-    before, after = with_editor(path, script, (120, 36))
-    assert before == after
 
 
 @pytest.mark.parametrize(

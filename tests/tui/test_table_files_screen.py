@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from terminal import EditorApp, press, said, settled, with_editor
+from terminal import EditorApp, press, said, settled
 
 
 @pytest.fixture
@@ -20,47 +20,6 @@ async def command(app: EditorApp, pilot, name: str, text: str = "") -> None:
         await press(pilot, "ctrl+a", "delete", *text)
     await press(pilot, "enter")
     await settled(pilot)
-
-
-def test_a_rename_goes_on_under_the_new_name_and_others_refer_to_it(path: Path) -> None:
-    async def script(app: EditorApp, pilot) -> tuple[str, str, list[str]]:
-        await command(app, pilot, "rename-table", "walks")
-        return app.main.table_name, said(app), sorted(app.workspace.files)
-
-    assert with_editor(path, script) == ("walks", "t is now walks.csv.", ["u", "walks"])
-    assert (path.parent / "u.csv").read_text() == "Asset,speed\n@walks,1\n"
-    assert not path.exists()
-
-
-def test_unsaved_edits_are_saved_first(path: Path) -> None:
-    async def script(app: EditorApp, pilot) -> tuple[str, str]:
-        await press(pilot, *"x", "enter")
-        await command(app, pilot, "rename-table", "walks")
-        return app.main.table_name, said(app)
-
-    name, text = with_editor(path, script)
-    assert name == "t"
-    assert "Ctrl+S" in text
-
-
-def test_a_copy_is_opened_and_a_table_is_deleted_after_a_question(path: Path) -> None:
-    async def script(app: EditorApp, pilot) -> tuple[str, str]:
-        await command(app, pilot, "duplicate-table")
-        copied = app.main.table_name
-        await command(app, pilot, "delete-table")
-        return copied, app.main.table_name
-
-    assert with_editor(path, script) == ("t_copy", "t")
-    assert sorted(one.name for one in path.parent.glob("*.csv")) == ["t.csv", "u.csv"]
-
-
-def test_a_table_that_others_refer_to_stays(path: Path) -> None:
-    async def script(app: EditorApp, pilot) -> str:
-        await command(app, pilot, "delete-table")
-        return said(app)
-
-    assert "refer" in with_editor(path, script)
-    assert path.exists()
 
 
 def test_with_read_only_no_table_is_renamed_and_no_cell_opens(path: Path) -> None:

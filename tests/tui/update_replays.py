@@ -1,9 +1,9 @@
-"""Write what the editor and the debugger show now into their replay files; with names only into those."""
+"""Write what the editor and the debugger show now into their replay files and pages; with names only into those."""
 
 import sys
 
 import debug_replay
-from replay import FILES, Replay, replayed
+from replay import FILES, PAGES, Replay, replayed, updated_page
 
 
 def main(names: list[str]) -> None:
@@ -15,6 +15,11 @@ def main(names: list[str]) -> None:
             if before != now:
                 path.write_text(now, "utf-8")
                 print(f"{path.name}: written")
+    for path in PAGES:
+        before = path.read_text("utf-8")
+        if (not names or path.stem in names) and (now := updated_page(before)) != before:
+            path.write_text(now, "utf-8")
+            print(f"{path.name}: written")
 
 
 if __name__ == "__main__":

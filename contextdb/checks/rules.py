@@ -283,19 +283,19 @@ RULES: dict[str, Rule] = {
         "error",
         "The table's assumptions leave no possible context.",
         "Correct the assumption that the message names; perhaps `and` should be `or`.",
-        ("checks.rows", "covering.judge"),
+        ("checks.run", "covering.judge"),
     ),
     "bad-assumption": Rule(
         "error",
         "An assumption of a table cannot be read.",
         "Correct it in contextdb.toml; it may name declared conditions and columns of its table.",
-        ("checks.rows",),
+        ("checks.run",),
     ),
     "always-any": Rule(
         "info",
         "Every cell of a condition is Any, so it excludes no row.",
         "No action needed; delete the column if nobody is going to fill it.",
-        ("checks.rows",),
+        ("checks.run",),
     ),
     "always-true": Rule(
         "info",
@@ -333,13 +333,13 @@ RULES: dict[str, Rule] = {
         "info",
         "Some rows were not compared with all others, because that would exceed the work limit of a check.",
         "No action needed; `contextdb coverage` allows ten times the work, and more with `--work`.",
-        ("checks.rows", "covering.judge"),
+        ("checks.run", "covering.judge"),
     ),
     "unused-condition": Rule(
         "info",
         "A condition is declared, but no table of the folder uses it.",
         "No action needed; delete its section if no table is going to use it.",
-        ("checks.rows",),
+        ("checks.run",),
     ),
     "gap": Rule(
         "info",

@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from contextdb.cells.sequences import Made
 from contextdb.core import pose_columns
 from contextdb.motion.clips.quaternions import Floats
@@ -85,10 +83,11 @@ class CrowdPoses(Made[Pose]):
     @cached_property
     def _parts(self) -> list[Floats]:
         """What the core made, one array after the other."""
-        n, n_joints = len(self), self._n_joints
-        shapes = (n, N_GIVEN), (2 * n, N_SEAM), (n, n_joints, 4), (n, n_joints, 3), (n, n_joints, 3)
-        ends = np.cumsum([math.prod(shape) for shape in shapes])[:-1]
-        return [part.reshape(shape) for part, shape in zip(np.split(self._made, ends), shapes, strict=True)]
+        n, n_joints, stop, parts = len(self), self._n_joints, 0, list[Floats]()
+        for shape in (n, N_GIVEN), (2 * n, N_SEAM), (n, n_joints, 4), (n, n_joints, 3), (n, n_joints, 3):
+            start, stop = stop, stop + math.prod(shape)
+            parts.append(self._made[start:stop].reshape(shape))
+        return parts
 
     @property
     def given(self) -> Floats:
@@ -122,9 +121,10 @@ class CrowdPoses(Made[Pose]):
 
     def _at(self, i: int) -> Pose:
         decision, (x, z, heading) = self.decisions[i], self.roots[i].tolist()
-        is_ahead, seam = self.given[i, IS_AHEAD:LOST].tolist()
+        given, _, rotations, translations, positions = self._parts
+        is_ahead, seam = given[i, IS_AHEAD:LOST].tolist()
         action = decision.action
         is_jump = seam >= 0.0 and (action is Action.JUMP or (action is not Action.START and is_ahead != 0.0))
         is_forced = is_jump and decision.continuing_cost is None
-        arrays = self.rotations[i], self.translations[i], self.positions[i], self.contacts[i]
+        arrays = rotations[i], translations[i], positions[i], self.contacts[i]
         return Pose(decision.playing, is_jump, is_forced, (x, z, heading), *arrays, float(self.play_rates[i]))

@@ -215,6 +215,7 @@ class Replay:
         self.seen = self._lines()
         for step in steps:
             if step.command in SHOWS:
+                await settled(pilot)  # a list that opens under a field is laid out once more
                 await painted(pilot.app)
                 step = replace(step, lines=tuple(self._show(step)))
             elif step.command not in ("table", "given", "settings"):

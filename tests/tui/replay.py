@@ -127,6 +127,8 @@ class Block:
 
     name: str
     """The heading over it, and a number from the second block under a heading on."""
+    number: int
+    """Which block under its heading it is, from 1."""
     start: int
     """Where its lines begin in the page, from 0."""
     stop: int
@@ -153,7 +155,7 @@ def read_page(text: str) -> list[Block]:
                 name = heading if names[heading] == 1 else f"{heading} {names[heading]}"
                 opens = any(step.command == "table" for step in steps)
                 before = tuple(step for step in common if not (opens and step.command == "table"))
-                blocks.append(Block(name, start, at, before, tuple(steps), ending))
+                blocks.append(Block(name, names[heading], start, at, before, tuple(steps), ending))
             else:
                 common = tuple(steps)
             start = None
@@ -215,6 +217,7 @@ class Replay:
         self.seen = self._lines()
         for step in steps:
             if step.command in SHOWS:
+                await settled(pilot)  # a list that opens under a field is laid out once more
                 await painted(pilot.app)
                 step = replace(step, lines=tuple(self._show(step)))
             elif step.command not in ("table", "given", "settings"):

@@ -14,7 +14,6 @@ from tui.model.condition_form import ConditionForm
 from tui.model.options import CONDITION_OPTIONS
 from tui.screens.add_column import AddColumn
 from tui.screens.dialog import Dialog
-from tui.widgets.field import Field
 
 TABLES = Path(__file__).parents[2] / "tables"
 
@@ -37,9 +36,6 @@ class DialogApp(App[None]):
 
     def _answered(self, answer: object) -> None:
         self.answer = answer
-
-    def wrong(self, key: str) -> str:
-        return self.screen.query_one(f"#field-{key}", Field).wrong
 
 
 def press(app: DialogApp, *keys: str, size: tuple[int, int] = (80, 24)) -> str:
@@ -131,6 +127,11 @@ def test_a_new_column_is_read_with_its_faults_by_field(table: Table, form: NewCo
     if not wrong:
         now = Insertion(1, (column,)).edit(table).apply(table)
         assert now.columns[1].name == form.name
+
+
+def test_every_job_of_a_new_column_stands_apart_from_what_it_means(table: Table):
+    seen = press(DialogApp(AddColumn(table, 0)), *"grip", "enter", "enter")
+    assert "cooldown_s" in seen
 
 
 def test_a_job_that_is_taken_is_told(table: Table):

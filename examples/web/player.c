@@ -172,7 +172,7 @@ static const cdb_fact *facts_of(int i)
     static cdb_fact own[MOST_CONDITIONS];
     for (size_t k = 0; k < table()->schema.n_conditions; k++) {
         own[k] = cdbm_crowd_live(crowd, (size_t)i, 0)->facts[k];
-        cdbm_add_own(&crowd->player, 0, k, (const cdbm_walk *)(const void *)state_of(i), &crowd->inputs[i].goal, &own[k]);
+        cdbm_add_own(&crowd->player, 0, k, state_of(i), &crowd->inputs[i].goal, &own[k]);
     }
     return own;
 }

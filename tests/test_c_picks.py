@@ -121,12 +121,14 @@ def test_rows_of_what_plays_and_their_costs_are_those_of_python(ask: Path, tmp_p
         moments = moments_of(rng, 12)
         [answers] = all_asked(ask, tmp_path, conditions_of(data_of(compiled)), [artefact(compiled, tmp_path)], moments, memory=1)
         for (unknown, facts), (status, rows), told in zip(moments, answers.rows, answers.told, strict=True):
-            assert (told.widened[0] == OK) is (status == OK)
-            if status == OK:
+            try:
                 expected = data_of(compiled).query_widened(facts, unknown)
-                assert told.widened[1] == expected.bits, (unknown, facts)
-                assert told.widened_penalties == (OK, expected.penalties.tolist()), (unknown, facts)
-                n_more += expected.bits != rows
+            except ContextError:  # a rule may be open in a row that is valid with widened facts alone
+                assert told.widened[0] != OK, (unknown, facts)
+                continue
+            assert (status, told.widened) == (OK, (OK, expected.bits)), (unknown, facts)
+            assert told.widened_penalties == (OK, expected.penalties.tolist()), (unknown, facts)
+            n_more += expected.bits != rows
     assert n_more > 50
 
 

@@ -555,14 +555,16 @@ static inline int cdbm_is_widening(const cdb_any *any)
 static inline int cdbm_let_play_on(const cdbm_player *player, const cdbm_input *input, const double *state, const cdbm_moved *moved,
     const uint8_t *ranges, double *wide, cdbm_room room)
 {
-    size_t database = (size_t)moved->to.database, range = (size_t)moved->to.range, at;
     cdbm_answer answer = {{NULL, NULL}, {NULL, NULL}};
     cdbm_table_ranges one;
+    size_t database, range, at;
     uint8_t is_valid = 0;
     double bias;
     int is_done;
     *wide = NAN;
-    if (moved->to.database < 0.0 || input->rows || player->table_of[database] < 0) return 1;
+    if (moved->to.database < 0.0 || input->rows) return 1;
+    database = (size_t)moved->to.database, range = (size_t)moved->to.range;
+    if (player->table_of[database] < 0) return 1;
     at = player->clips[database].range_at + range;
     if (ranges[at] || !cdbm_is_widening(player->opened[player->table_of[database]])) return 1;
     is_done = cdbm_ask_table(player, (size_t)player->table_of[database], input, state, 1, &answer, &room);

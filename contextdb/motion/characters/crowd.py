@@ -26,7 +26,7 @@ from contextdb.motion.clips.quaternions import Floats
 from contextdb.motion.output.pose import Pose
 from contextdb.motion.output.samples import Flags
 from contextdb.motion.output.stream import PoseStream
-from contextdb.motion.output.streams import PoseStreams
+from contextdb.motion.output.streams import streams_alike
 from contextdb.motion.records import collector_at_rest
 from contextdb.motion.selection.controller import Decided, rows_of
 from contextdb.motion.selection.controller_group import ControllerGroup
@@ -182,7 +182,7 @@ class Crowd(ListSequence[Character]):
             for alike in self._equal_streams(of_updates):
                 numbers = [of_updates[k] for k in alike]
                 part = updates if len(alike) == len(of_updates) else updates._replace(decisions=updates.decisions[alike])
-                streams = PoseStreams.of_like([stream for i in numbers if (stream := self[i].stream) is not None])
+                streams = streams_alike([stream for i in numbers if (stream := self[i].stream) is not None])
                 below = tuple(grounds[i] for i in numbers)
                 own = decisions if len(numbers) == len(self) else [decisions[i] for i in numbers]
                 groups.append((numbers, streams, *streams.updated(part, own, dt, places[numbers], below if any(below) else None)))

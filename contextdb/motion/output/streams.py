@@ -52,14 +52,6 @@ class PoseStreams(ListSequence[PoseStream]):
         if not all(stream.is_like(self._items[0]) for stream in self._items):
             raise MotionError(Fault("the streams have different banks or settings.", "streams of the same banks and settings"))
 
-    @classmethod
-    def of_like(cls, streams: list[PoseStream]) -> PoseStreams:
-        """Those of streams that are known to be like each other. Raises MotionError for the same one twice."""
-        _check_each_once(streams)
-        own = cls.__new__(cls)
-        own._items, own._pipeline = streams, streams[0]._pipeline
-        return own
-
     def __repr__(self) -> str:
         return f"<PoseStreams: {plural(len(self), 'character')}>"
 
@@ -167,6 +159,14 @@ class PoseStreams(ListSequence[PoseStream]):
             if each is not None and not callable(each):
                 raise ContextError(Fault(f"the ground is {each!r}.", "a function, or None", place=Place(f"character {i}")))
         return tuple(ground) if any(each is not None for each in ground) else None
+
+
+def streams_alike(streams: list[PoseStream]) -> PoseStreams:
+    """Streams that are known to be like each other. Raises MotionError for the same one twice."""
+    _check_each_once(streams)
+    alike = PoseStreams.__new__(PoseStreams)
+    alike._items, alike._pipeline = streams, streams[0]._pipeline
+    return alike
 
 
 def _check_each_once(streams: list[PoseStream]) -> None:

@@ -91,7 +91,7 @@ class Asked:
         if self is nothing_asked(len(self.tags)):
             return True
         given = *self.tags, *self.bias, *self.among, *self.penalties, *self.event
-        return not any(self.force) and not any(self.interrupt) and given.count(None) == len(given)
+        return not any(self.force) and not any(self.interrupt) and all(one is None for one in given)
 
     def options(self, i: int) -> SearchOptions:
         """Those of one, checked."""

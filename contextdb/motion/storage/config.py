@@ -178,7 +178,9 @@ class MotionConfig:
         return Selector([Entry(database, databases.get(database), threshold) for database, threshold in settings.order])
 
     def joint_databases_of(self, controller: str) -> list[str]:
-        """The databases of the joint clips that the characters of a controller may be cast for, each once."""
+        """The databases of the joint clips that the characters of a controller may be cast for, each once. Raises SchemaError for
+        an unknown one."""
+        _known("controllers", controller, self.controllers, self.file)
         names = [each for name in self.joint_clips.get(controller, ()) for each in self._ordered(name)]
         return list(dict.fromkeys(names))
 

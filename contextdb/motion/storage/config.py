@@ -274,14 +274,15 @@ def _joint_faults(
     file: str | None,
 ) -> Iterator[Fault]:
     """The names of joint clips that are none: of no selector and no database, or of databases without roles."""
+    orders = {name: [name] for name in databases} | {name: [each for each, _ in own.order] for name, own in selectors.items()}
+    known = [name for name, order in orders.items() if all(each in databases and databases[each].roles for each in order)]
     for controller, names in joint.items():
         where, place = f"[controllers.{controller}]", Place(file)
         for name in names:
-            order = [each for each, _ in selectors[name].order] if name in selectors else [name]
+            order = orders.get(name, [name])
             if any(each not in databases for each in order):
-                known = list(dict.fromkeys((*selectors, *databases)))
                 problem = f"{where} joint: there is no selector and no database {in_quotes(name)}."
-                yield Fault(problem, some(known), mend_for(name, known), place)
+                yield Fault(problem, some(known) or "none: no database has roles", mend_for(name, known), place)
             elif without := [each for each in order if not databases[each].roles]:
                 problem = f"{where} joint: [databases.{without[0]}] has no roles."
                 yield Fault(problem, 'roles = ["Tackler", "Carrier"] in it', place=place)

@@ -132,6 +132,14 @@ def test_a_table_whose_rules_need_facts_of_a_role_is_not_cast(program: Path, tmp
     assert ran(program, tmp_path / "t.safetensors", tmp_path / "q.txt") == "4\n"
 
 
+@pytest.mark.parametrize("roles", [["Nobody"], ["Nobody", "Defender"], ["Defender", "Nobody"]])
+def test_an_actor_for_no_role_of_the_table_is_refused_wherever_it_is_offered(program: Path, tmp_path: Path, roles: list[str]):
+    columns = {"Asset": ["a"], "Defender.dist": ["Any"]}
+    cdb.Table.from_columns(columns, {"Defender.dist": {"type": "number"}}).compile().save(tmp_path / "t.safetensors")
+    (tmp_path / "q.txt").write_text("".join(f"a\t{role}\t1\t-\n" for role in roles) + "go\t1\n", encoding="utf-8")
+    assert ran(program, tmp_path / "t.safetensors", tmp_path / "q.txt") == "6\n"
+
+
 def test_damaged_roles_are_refused_or_cast_and_never_crash_it(tmp_path: Path):
     rng = random.Random(12)
     compiled = table(rng, 70)
